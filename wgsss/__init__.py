@@ -1,0 +1,5 @@
+"""Translucent materials in real time, measured against references."""
+
+from __future__ import annotations
+
+__version__ = "0.1.0"
