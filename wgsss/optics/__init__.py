@@ -1,0 +1,8 @@
+"""How light spreads below a surface. Lengths in mm, profiles in 1/mm^2, per RGB channel; no GPU."""
+
+from __future__ import annotations
+
+from wgsss.optics.dipole import Dipole, diffuse_fresnel
+from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
+
+__all__ = ["SKIN_GAUSSIANS", "Dipole", "SumOfGaussians", "diffuse_fresnel"]
