@@ -1,0 +1,28 @@
+"""What is rendered: meshes, materials, lights, cameras and the files they come from. No GPU code."""
+
+from __future__ import annotations
+
+from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
+from wgsss.scene.material import MATERIALS, Maps, Material, material
+from wgsss.scene.mesh import Mesh
+from wgsss.scene.scene import Object, Scene
+
+__all__ = [
+    "MATERIALS",
+    "Camera",
+    "DirectionalLight",
+    "EnvironmentLight",
+    "Light",
+    "Maps",
+    "Material",
+    "Mesh",
+    "Object",
+    "OrthographicCamera",
+    "PerspectiveCamera",
+    "PointLight",
+    "RectLight",
+    "Scene",
+    "SphereLight",
+    "material",
+]

@@ -1,0 +1,131 @@
+"""Cameras: right-handed view space looking down -z, and WebGPU clip space with depth from 0 (near) to 1 (far)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene import checks
+from wgsss.scene.checks import Triple
+
+Matrix = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Camera:
+    eye: Triple
+    """mm"""
+    target: Triple
+    """the point in the middle of the image, mm"""
+    up: Triple = (0.0, 1.0, 0.0)
+    """the direction that points up in the image, of any length but zero"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "eye")
+        checks.triple(self, "target")
+        checks.triple(self, "up", nonzero=True)
+        gaze = np.subtract(self.target, self.eye)
+        if not gaze.any():
+            raise InputError("eye and target must not be the same point")
+        checks.not_parallel(gaze, self.up, "up must not be parallel to the line from eye to target")
+
+    def view(self) -> Matrix:
+        """(4, 4): world space, mm, to view space, mm; the camera looks down -z with y up."""
+        back = _unit(np.subtract(self.eye, self.target))
+        right = _unit(np.cross(self.up, back))
+        matrix = np.eye(4)
+        matrix[:3, :3] = right, np.cross(back, right), back
+        matrix[:3, 3] = -matrix[:3, :3] @ np.asarray(self.eye)
+        return matrix
+
+    def _turned(self, degrees: float) -> Self:
+        """The eye moved about `up` through the target, counter-clockwise seen from the tip of `up` (Rodrigues)."""
+        axis, angle = _unit(np.asarray(self.up)), math.radians(degrees)
+        arm = np.subtract(self.eye, self.target)
+        turned = arm * math.cos(angle) + np.cross(axis, arm) * math.sin(angle)
+        turned += axis * (axis @ arm) * (1 - math.cos(angle))
+        return replace(self, eye=tuple(self.target + turned))
+
+    @classmethod
+    def orbit(cls, target: Triple, distance: float, azimuth: float, elevation: float, **rest: Any) -> Self:
+        """A camera on a sphere about the target.
+
+        `distance` is in mm. `azimuth`, in degrees, is 0 on the +z side and 90 on the +x side; `elevation`, in degrees
+        above the horizontal, lies between -90 and 90, both excluded. `rest` are the camera's further fields.
+        """
+        around, above = math.radians(azimuth), math.radians(elevation)
+        offset = np.array([math.sin(around) * math.cos(above), math.sin(above), math.cos(around) * math.cos(above)])
+        return cls(tuple(np.add(target, distance * offset)), target, **rest)
+
+
+@dataclass(frozen=True)
+class PerspectiveCamera(_Camera):
+    """A pinhole camera."""
+
+    fov: float = 30.0
+    """vertical angle of view, degrees"""
+    turn: float = 0.0
+    """degrees per second by which the eye goes round the target, about `up`"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.number(self, "fov", 1, 170)
+        checks.number(self, "turn")
+
+    def projection(self, aspect: float, near: float, far: float) -> Matrix:
+        """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""
+        _check_range(aspect, near, far, least=0.0)
+        scale = 1 / math.tan(math.radians(self.fov) / 2)
+        matrix = np.zeros((4, 4))
+        matrix[0, 0], matrix[1, 1] = scale / aspect, scale
+        matrix[2, 2:] = far / (near - far), near * far / (near - far)
+        matrix[3, 2] = -1
+        return matrix
+
+    def at(self, time_s: float) -> PerspectiveCamera:
+        """The camera as it stands at a time in seconds, no longer turning."""
+        return replace(self._turned(self.turn * time_s), turn=0.0) if self.turn else self
+
+
+@dataclass(frozen=True)
+class OrthographicCamera(_Camera):
+    """A camera with parallel rays."""
+
+    height: float = 100.0
+    """what the image spans from bottom to top, mm"""
+    turn: float = 0.0
+    """degrees per second by which the eye goes round the target, about `up`"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.number(self, "height", 0, above=True)
+        checks.number(self, "turn")
+
+    def projection(self, aspect: float, near: float, far: float) -> Matrix:
+        """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""
+        _check_range(aspect, near, far, least=-math.inf)
+        matrix = np.eye(4)
+        matrix[0, 0], matrix[1, 1] = 2 / (self.height * aspect), 2 / self.height
+        matrix[2, 2:] = 1 / (near - far), near / (near - far)
+        return matrix
+
+    def at(self, time_s: float) -> OrthographicCamera:
+        """The camera as it stands at a time in seconds, no longer turning."""
+        return replace(self._turned(self.turn * time_s), turn=0.0) if self.turn else self
+
+
+Camera = PerspectiveCamera | OrthographicCamera
+
+
+def _check_range(aspect: float, near: float, far: float, *, least: float) -> None:
+    if not (0 < aspect < math.inf and least < near < far < math.inf):
+        raise InputError(f"no projection for aspect {aspect:g}, near {near:g} mm and far {far:g} mm")
+
+
+def _unit(vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,119 @@
+"""Light sources. Radiometry is SI: irradiance W/m^2, radiance W/(m^2 sr), intensity W/sr; lengths are millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.scene import checks
+from wgsss.scene.checks import Triple
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """A source so far away that its light arrives in parallel."""
+
+    direction: Triple
+    """the direction in which light travels, of any length but zero"""
+    irradiance: Triple
+    """RGB, W/m^2, on a surface facing the light"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "direction", nonzero=True)
+        checks.triple(self, "irradiance", 0)
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """A source without size; a surface facing it at a distance of d metres gets intensity / d^2 W/m^2."""
+
+    position: Triple
+    """mm"""
+    intensity: Triple
+    """RGB, W/sr"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "position")
+        checks.triple(self, "intensity", 0)
+
+
+@dataclass(frozen=True)
+class RectLight:
+    """A rectangle that emits from one side."""
+
+    position: Triple
+    """its centre, mm"""
+    direction: Triple
+    """the normal of the side that emits, of any length but zero"""
+    up: Triple
+    """the direction along which height is measured; only its part across `direction` counts"""
+    width: float
+    """mm"""
+    height: float
+    """mm"""
+    radiance: Triple
+    """RGB, W/(m^2 sr)"""
+    samples: int = 16
+    """points on the rectangle that light and shadow are computed from"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "position")
+        checks.triple(self, "direction", nonzero=True)
+        checks.triple(self, "up", nonzero=True)
+        checks.not_parallel(self.direction, self.up, "up must not be parallel to direction")
+        checks.number(self, "width", 0, above=True)
+        checks.number(self, "height", 0, above=True)
+        checks.triple(self, "radiance", 0)
+        checks.integer(self, "samples", 1, 256)
+
+
+@dataclass(frozen=True)
+class SphereLight:
+    """A sphere that emits outwards."""
+
+    position: Triple
+    """its centre, mm"""
+    radius: float
+    """mm"""
+    radiance: Triple
+    """RGB, W/(m^2 sr)"""
+    samples: int = 16
+    """points on the sphere that light and shadow are computed from"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "position")
+        checks.number(self, "radius", 0, above=True)
+        checks.triple(self, "radiance", 0)
+        checks.integer(self, "samples", 1, 256)
+
+
+@dataclass(frozen=True)
+class EnvironmentLight:
+    """Light from all around, constant or from a latitude-longitude image.
+
+    A direction (x, y, z) is found at u = 1/2 + atan2(x, -z) / 2 pi and v = acos(y) / pi: the middle of the image lies
+    along -z, its top along +y, and +x to the right of the middle.
+    """
+
+    radiance: Triple = (1.0, 1.0, 1.0)
+    """RGB, W/(m^2 sr); multiplies the image where there is one"""
+    file: str | None = None
+    """a latitude-longitude image, .hdr or .exr"""
+    rotation: float = 0.0
+    """degrees by which the environment is turned about +y, counter-clockwise seen from above"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "radiance", 0)
+        checks.number(self, "rotation")
+
+    def pixels(self) -> npt.NDArray[np.float32]:
+        """float32 (H, W, 3): radiance by latitude (top row +y) and longitude, before `rotation`; 1 x 1 without a file.
+
+        Negative values are clamped to zero. Raises InputError for a file that is missing, damaged or holds NaN.
+        """
+        raise NotImplementedError
+
+
+Light = DirectionalLight | PointLight | RectLight | SphereLight | EnvironmentLight

@@ -1,0 +1,126 @@
+"""Materials: how light is scattered and absorbed below a surface, and what the surface itself does."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError, unknown
+from wgsss.optics import SKIN_GAUSSIANS, Dipole, SumOfGaussians
+from wgsss.scene import checks
+from wgsss.scene.checks import Triple
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Textures over a mesh's own texture coordinates, top row at v = 0; None where there is none."""
+
+    base_color: npt.NDArray[Any] | None = None
+    """uint8 (H, W, 3), sRGB"""
+    normal: npt.NDArray[Any] | None = None
+    """uint8 (H, W, 3), linear, tangent space"""
+    specular: npt.NDArray[Any] | None = None
+    """uint8 (H, W), linear"""
+
+    def __post_init__(self) -> None:
+        for name, channels in (("base_color", 3), ("normal", 3), ("specular", None)):
+            pixels = getattr(self, name)
+            if pixels is not None and (
+                pixels.dtype != np.uint8 or pixels.size == 0 or pixels.shape[2:] != ((channels,) if channels else ())
+            ):
+                raise InputError(f"the {name} map must be uint8 of H x W{f' x {channels}' if channels else ''}")
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A homogeneous translucent medium below a rough dielectric surface.
+
+    The medium is given either by its coefficients (sigma_a and sigma_s_prime) or by a tabulated profile (gaussians).
+    Raises InputError naming the field that is out of range.
+    """
+
+    name: str
+    sigma_a: Triple | None = None
+    """absorption, 1/mm"""
+    sigma_s_prime: Triple | None = None
+    """reduced scattering, 1/mm"""
+    eta: float = 1.3
+    """index of refraction relative to air"""
+    gaussians: SumOfGaussians | None = None
+    """a tabulated diffusion profile, in place of the coefficients"""
+    roughness: float = 0.35
+    """perceptual roughness; GGX alpha = roughness^2. Below 0.02 a highlight falls between pixels"""
+    specular: float = 1.0
+    """scale of the GGX lobe, 0 to 1"""
+    base_color: Triple = (1.0, 1.0, 1.0)
+    """linear; multiplies what the profile returns"""
+    color_after: float = 1.0
+    """share of the base colour applied after diffusion, col(x_o)^a col(x_i)^(1 - a) (Mikkelsen 2009, section 3.5)"""
+    maps: Maps = field(default_factory=Maps)
+
+    def __post_init__(self) -> None:
+        if self.gaussians is None:
+            if self.sigma_a is None or self.sigma_s_prime is None:
+                missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
+                raise InputError(f"{missing} is missing: a material needs sigma_a and sigma_s_prime, or gaussians")
+            checks.triple(self, "sigma_a", 0)
+            checks.triple(self, "sigma_s_prime", 0, above=True)
+        elif not isinstance(self.gaussians, SumOfGaussians):
+            raise InputError("gaussians must be a SumOfGaussians (variances in mm^2, weights per channel)")
+        elif self.sigma_a is not None or self.sigma_s_prime is not None:
+            raise InputError("gaussians stand in place of sigma_a and sigma_s_prime: give one or the other")
+        checks.number(self, "eta", 1, 3)
+        checks.number(self, "roughness", 0.02, 1)
+        checks.number(self, "specular", 0, 1)
+        checks.triple(self, "base_color", 0, 1)
+        checks.number(self, "color_after", 0, 1)
+
+    @cached_property
+    def profile(self) -> Dipole | SumOfGaussians:
+        """The diffusion profile R(r), 1/mm^2 per channel."""
+        if self.gaussians is not None:
+            return self.gaussians
+        assert self.sigma_a is not None and self.sigma_s_prime is not None
+        return Dipole(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta)
+
+
+# Measured by Jensen et al. 2001, "A Practical Model for Subsurface Light Transport", figure 5: sigma_s' and sigma_a,
+# 1/mm. Marble alone has an eta of 1.5: only so does the dipole's total give the diffuse reflectance of the same table.
+_JENSEN_2001: dict[str, tuple[Triple, Triple, float]] = {
+    "apple": ((2.29, 2.39, 1.97), (0.003, 0.0034, 0.046), 1.3),
+    "chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19), 1.3),
+    "chicken2": ((0.19, 0.25, 0.32), (0.018, 0.088, 0.2), 1.3),
+    "cream": ((7.38, 5.47, 3.15), (0.0002, 0.0028, 0.0163), 1.3),
+    "ketchup": ((0.18, 0.07, 0.03), (0.061, 0.97, 1.45), 1.3),
+    "marble": ((2.19, 2.62, 3.0), (0.0021, 0.0041, 0.0071), 1.5),
+    "potato": ((0.68, 0.7, 0.55), (0.0024, 0.009, 0.12), 1.3),
+    "skimmilk": ((0.7, 1.22, 1.9), (0.0014, 0.0025, 0.0142), 1.3),
+    "skin1": ((0.74, 0.88, 1.01), (0.032, 0.17, 0.48), 1.3),
+    "skin2": ((1.09, 1.59, 1.79), (0.013, 0.07, 0.145), 1.3),
+    "spectralon": ((11.6, 20.4, 14.9), (0.0, 0.0, 0.0), 1.3),
+    "wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014), 1.3),
+}
+
+MATERIALS: dict[str, Material] = {
+    name: Material(name, sigma_a=sigma_a, sigma_s_prime=sigma_s_prime, eta=eta)
+    for name, (sigma_s_prime, sigma_a, eta) in _JENSEN_2001.items()
+}
+# d'Eon & Luebke 2007: the profile is normalised, so its colour comes from elsewhere: the diffuse reflectance of Skin2
+# in the same table. Their reflectance at normal incidence, 0.028, is an eta of 1.4.
+MATERIALS["skin"] = Material("skin", gaussians=SKIN_GAUSSIANS, eta=1.4, base_color=(0.63, 0.44, 0.34))
+
+
+def material(name: str) -> Material:
+    """The measured material of that name, whatever its case, spaces, hyphens and underscores ("Whole Milk").
+
+    Raises InputError for a name that is not known, suggesting the nearest one.
+    """
+    found = MATERIALS.get(re.sub(r"[\s_-]+", "", name).lower())
+    if found is None:
+        raise unknown("material", name, MATERIALS)
+    return found

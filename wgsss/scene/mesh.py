@@ -1,0 +1,102 @@
+"""Triangle meshes: welded positions for topology, and texture coordinates and normals per corner beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh in millimetres, counter-clockwise seen from outside.
+
+    `positions` are welded: no two are equal, so that edges and neighbours cross texture seams. What a seam or a hard
+    edge splits, texture coordinates and normals, is kept per corner of a face. The arrays are held read-only.
+    Raises InputError where shapes do not fit, a number is not finite or a face names a vertex that is not there.
+    """
+
+    positions: Array
+    """float32 (V, 3), mm"""
+    faces: Array
+    """int32 (F, 3), indices into positions"""
+    corner_normals: Array | None = None
+    """float32 (F, 3, 3) unit normals per corner, or None where the surface is smooth"""
+    corner_uvs: Array | None = None
+    """float32 (F, 3, 2), u to the right and v down, or None"""
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        self._hold("positions", np.float32, (None, 3))
+        self._hold("faces", np.int32, (None, 3))
+        corners = len(self.faces)
+        self._hold("corner_normals", np.float32, (corners, 3, 3))
+        self._hold("corner_uvs", np.float32, (corners, 3, 2))
+        if not corners:
+            raise InputError(f"{self.name}: the mesh has no faces")
+        if self.faces.min() < 0 or self.faces.max() >= len(self.positions):
+            raise InputError(f"{self.name}: a face names a vertex that is not there")
+
+    def _hold(self, field: str, dtype: type, shape: tuple[int | None, ...]) -> None:
+        value = getattr(self, field)
+        if value is None:
+            return
+        array: Array = np.ascontiguousarray(value, dtype=dtype).view()
+        if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
+            wanted = " x ".join("N" if n is None else str(n) for n in shape)
+            raise InputError(f"{self.name}: {field} must be {wanted}, not {' x '.join(map(str, array.shape))}")
+        if dtype is np.float32 and not np.isfinite(array).all():
+            raise InputError(f"{self.name}: {field} holds a number that is not finite")
+        array.flags.writeable = False
+        object.__setattr__(self, field, array)
+
+    @cached_property
+    def face_normals(self) -> Array:
+        """float64 (F, 3): normals as long as twice the face's area, mm^2."""
+        a, b, c = (self.positions[self.faces[:, i]].astype(np.float64) for i in range(3))
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def normals(self) -> Array:
+        """float32 (V, 3): smooth unit normals, the mean of the faces around weighted by their angle at the vertex."""
+        corners = self.positions.astype(np.float64)[self.faces]
+        size = np.linalg.norm(self.face_normals, axis=1, keepdims=True)
+        unit = np.divide(self.face_normals, size, out=np.zeros_like(self.face_normals), where=size > 0)
+        total = np.zeros((len(self.positions), 3))
+        for i in range(3):
+            to_next, to_last = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
+            angle = np.arctan2(size[:, 0], np.einsum("ij,ij->i", to_next, to_last))
+            for axis in range(3):
+                total[:, axis] += np.bincount(self.faces[:, i], angle * unit[:, axis], len(total))
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        # The fan of a folded sheet may cancel out; any direction is as good there, but it must be a unit vector.
+        up = np.broadcast_to((0.0, 1.0, 0.0), total.shape)
+        return np.where(length > 1e-12, total / np.maximum(length, 1e-12), up).astype(np.float32)
+
+    @cached_property
+    def shading_normals(self) -> Array:
+        """float32 (F, 3, 3): the unit normal at each corner, from the file where it has hard edges, else smooth."""
+        return self.normals[self.faces] if self.corner_normals is None else self.corner_normals
+
+    @cached_property
+    def area(self) -> float:
+        """Surface area, mm^2."""
+        return float(np.linalg.norm(self.face_normals, axis=1).sum() / 2)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """float32 (2, 3): the least and greatest coordinates, mm."""
+        return np.stack([self.positions.min(axis=0), self.positions.max(axis=0)])
+
+    def deformed(self, positions: Array) -> Mesh:
+        """The same topology and texture coordinates at other positions (V, 3), mm, with smooth normals."""
+        if np.shape(positions) != self.positions.shape:
+            raise InputError(f"{self.name}: a deformation must keep {len(self.positions)} positions")
+        return replace(self, positions=positions, corner_normals=None)

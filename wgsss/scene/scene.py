@@ -1,0 +1,101 @@
+"""A scene: objects, lights, a camera, and how its light becomes a picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError, unknown
+from wgsss.scene import checks
+from wgsss.scene.camera import Camera
+from wgsss.scene.checks import Triple
+from wgsss.scene.light import Light
+from wgsss.scene.material import Material
+from wgsss.scene.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+TONE_MAPS = ("none", "reinhard", "aces")
+
+
+class Motion(Protocol):
+    """How an object's shape changes over time."""
+
+    def apply(self, positions: Array, time_s: float) -> Array:
+        """Positions (V, 3) in mm, in the object's own space, as they are at a time in seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """A mesh of one material, placed in the world."""
+
+    mesh: Mesh
+    material: Material
+    translate: Triple = (0.0, 0.0, 0.0)
+    """mm, applied after the rotation"""
+    rotate: Triple = (0.0, 0.0, 0.0)
+    """degrees about the world's x, then y, then z axis, through the object's origin"""
+    motion: Motion | None = None
+    """in the object's own space, before it is placed"""
+
+    def __post_init__(self) -> None:
+        checks.triple(self, "translate")
+        checks.triple(self, "rotate")
+
+    @cached_property
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """(4, 4): object space to world space, rigid."""
+        matrix = np.eye(4)
+        for axis, degrees in enumerate(self.rotate):
+            cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            turn = np.eye(4)
+            turn[i, i], turn[i, j], turn[j, i], turn[j, j] = cos, -sin, sin, cos
+            matrix = turn @ matrix
+        matrix[:3, 3] = self.translate
+        return matrix
+
+    def at(self, time_s: float) -> Object:
+        """The object as it is at a time in seconds, no longer moving."""
+        if self.motion is None:
+            return self
+        moved = self.mesh.deformed(self.motion.apply(self.mesh.positions, time_s))
+        return replace(self, mesh=moved, motion=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is rendered. Raises InputError naming the field that does not fit."""
+
+    name: str
+    objects: tuple[Object, ...]
+    lights: tuple[Light, ...]
+    camera: Camera
+    exposure: float = 0.0
+    """stops: radiance is multiplied by 2^exposure before tone mapping"""
+    tone_map: str = "aces"
+    """one of none, reinhard, aces"""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "objects", tuple(self.objects))
+        object.__setattr__(self, "lights", tuple(self.lights))
+        if not self.objects:
+            raise InputError(f"{self.name}: the scene has no objects")
+        checks.number(self, "exposure", -32, 32)
+        if self.tone_map not in TONE_MAPS:
+            raise unknown("tone_map", str(self.tone_map), TONE_MAPS)
+
+    @cached_property
+    def bounds(self) -> npt.NDArray[np.float64]:
+        """(2, 3): the least and greatest coordinates of all objects, world mm."""
+        placed = np.concatenate([o.mesh.positions @ o.matrix[:3, :3].T + o.matrix[:3, 3] for o in self.objects])
+        return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+    def at(self, time_s: float) -> Scene:
+        """The scene as it is at a time in seconds: a still, in which nothing moves or turns."""
+        return replace(self, objects=tuple(o.at(time_s) for o in self.objects), camera=self.camera.at(time_s))
