@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from wgsss.optics.dipole import Dipole, diffuse_fresnel
+from wgsss.optics.fit import Profile, fit_error, fit_gaussians
 from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
 
-__all__ = ["SKIN_GAUSSIANS", "Dipole", "SumOfGaussians", "diffuse_fresnel"]
+__all__ = [
+    "SKIN_GAUSSIANS",
+    "Dipole",
+    "Profile",
+    "SumOfGaussians",
+    "diffuse_fresnel",
+    "fit_error",
+    "fit_gaussians",
+]
