@@ -1,0 +1,220 @@
+"""The adapter and its device, what lives on it from frame to frame, and the way there and back."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from wgsss import wgsl
+from wgsss.errors import InputError
+
+os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())  # unset, it makes drivers print noise
+
+# What is asked of every adapter: WebGPU's own defaults. Asking for nothing would grant the adapter's limits, and what
+# runs on a generous software driver would then fail on a GPU.
+LIMITS = {
+    "max-texture-dimension-2d": 8192,
+    "max-texture-array-layers": 256,
+    "max-bind-groups": 4,
+    "max-sampled-textures-per-shader-stage": 16,
+    "max-samplers-per-shader-stage": 16,
+    "max-storage-buffers-per-shader-stage": 8,
+    "max-storage-textures-per-shader-stage": 4,
+    "max-uniform-buffers-per-shader-stage": 12,
+    "max-uniform-buffer-binding-size": 65536,
+    "max-storage-buffer-binding-size": 128 << 20,
+    "max-buffer-size": 256 << 20,
+    "max-color-attachments": 8,
+    "max-color-attachment-bytes-per-sample": 32,
+    "max-compute-invocations-per-workgroup": 256,
+    "max-compute-workgroup-size-x": 256,
+    "max-compute-workgroup-size-y": 256,
+    "max-compute-workgroup-storage-size": 16384,
+    "max-compute-workgroups-per-dimension": 65535,
+    "min-uniform-buffer-offset-alignment": 256,
+    "min-storage-buffer-offset-alignment": 256,
+}
+
+FORMATS: dict[str, tuple[str, int]] = {  # texture format -> numpy scalar, channels
+    "r32float": ("<f4", 1),
+    "rg32float": ("<f4", 2),
+    "rgba32float": ("<f4", 4),
+    "r16float": ("<f2", 1),
+    "rg16float": ("<f2", 2),
+    "rgba16float": ("<f2", 4),
+    "r32uint": ("<u4", 1),
+    "rg32uint": ("<u4", 2),
+    "rgba32uint": ("<u4", 4),
+    "r8unorm": ("u1", 1),
+    "rg8unorm": ("u1", 2),
+    "rgba8unorm": ("u1", 4),
+    "rgba8unorm-srgb": ("u1", 4),
+    "depth32float": ("<f4", 1),
+}
+
+SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what it does
+    "nearest_clamp": {},
+    "linear_clamp": {"mag_filter": "linear", "min_filter": "linear"},
+    "linear_repeat": {"mag_filter": "linear", "min_filter": "linear", "address_mode_u": "repeat", "address_mode_v": "repeat"},
+    "linear_wrap_u": {"mag_filter": "linear", "min_filter": "linear", "address_mode_u": "repeat"},
+    "compare_less": {"mag_filter": "linear", "min_filter": "linear", "compare": "less-equal"},
+}
+
+
+def texel_bytes(texture_format: str) -> int:
+    """Bytes of one texel."""
+    scalar, channels = FORMATS[texture_format]
+    return np.dtype(scalar).itemsize * channels
+
+
+def adapters() -> list[Any]:
+    """The Vulkan adapters of this machine."""
+    import wgpu
+    from wgpu.backends.wgpu_native import extras
+
+    if not getattr(adapters, "instance", False):  # other backends are never used, and slow to ask
+        extras.set_instance_extras(backends=["Vulkan"])
+        adapters.instance = True  # type: ignore[attr-defined]
+    wanted = os.environ.get("WGPUPY_WGPU_ADAPTER_NAME", "")
+    return [a for a in wgpu.gpu.enumerate_adapters_sync() if wanted in a.info["device"] and a.info["backend_type"] == "Vulkan"]
+
+
+@dataclass(frozen=True)
+class TextureKey:
+    """What makes two textures interchangeable in the pool."""
+
+    size: tuple[int, int, int]  # width, height, layers
+    format: str
+    usage: int
+
+    @property
+    def nbytes(self) -> int:
+        return self.size[0] * self.size[1] * self.size[2] * texel_bytes(self.format)
+
+
+class Gpu:
+    """A device with its pipelines, samplers and pool of textures.
+
+    Raises InputError where there is no Vulkan adapter.
+    """
+
+    def __init__(self) -> None:
+        found = adapters()
+        if not found:
+            raise InputError("no Vulkan adapter found: install a GPU driver, or Mesa's software driver (mesa-vulkan-drivers)")
+        found.sort(key=lambda a: ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown").index(a.info["adapter_type"]))
+        self.adapter = found[0]
+        self.info = self.adapter.info
+        self.is_cpu = self.info["adapter_type"] == "CPU"
+        # On lavapipe timestamps of compute passes are misattributed, so CPU adapters are timed by a fenced wall clock.
+        self.has_timestamps = not self.is_cpu and "timestamp-query" in self.adapter.features
+        self.device = self.adapter.request_device_sync(
+            required_features=["timestamp-query"] if self.has_timestamps else [], required_limits=LIMITS
+        )
+        self.queue = self.device.queue
+        self._shaders: dict[str, Any] = {}
+        self._pipelines: dict[Any, Any] = {}
+        self._samplers: dict[str, Any] = {}
+        self._free: defaultdict[Any, list[Any]] = defaultdict(list)
+        self._fence = self.buffer(np.zeros(1, np.uint32))
+
+    @property
+    def name(self) -> str:
+        """The adapter, in words."""
+        return f"{self.info['device']}, {self.info['description']}"
+
+    # what stays
+
+    def texture(self, pixels: np.ndarray, texture_format: str) -> Any:
+        """A texture that holds `pixels` (height, width[, channels]) or (layers, height, width, channels)."""
+        import wgpu
+
+        scalar, channels = FORMATS[texture_format]
+        data = np.ascontiguousarray(pixels, np.dtype(scalar))
+        data = data[..., None] if data.ndim == 2 else data
+        data = data[None] if data.ndim == 3 else data
+        layers, height, width, got = data.shape
+        if got != channels:
+            raise ValueError(f"{texture_format} wants {channels} channels, got {got}")
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST | wgpu.TextureUsage.COPY_SRC
+        texture = self.device.create_texture(size=(width, height, layers), format=texture_format, usage=usage)
+        layout = {"bytes_per_row": width * texel_bytes(texture_format), "rows_per_image": height}
+        self.queue.write_texture({"texture": texture}, data, layout, (width, height, layers))
+        return texture
+
+    def buffer(self, data: np.ndarray | bytes) -> Any:
+        """A buffer that holds `data`, to be bound as storage or used as an index buffer."""
+        import wgpu
+
+        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDEX | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+        raw = data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
+        return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
+
+    def read_texture(self, texture: Any) -> np.ndarray:
+        """The texels of a texture: (height, width, channels), with a leading axis of layers where there are several."""
+        scalar, channels = FORMATS[texture.format]
+        width, height, layers = texture.size
+        layout = {"bytes_per_row": width * texel_bytes(texture.format), "rows_per_image": height}
+        raw = self.queue.read_texture({"texture": texture}, layout, texture.size)
+        texels = np.frombuffer(raw, scalar).reshape(layers, height, width, channels)
+        return texels[0] if layers == 1 else texels
+
+    def fence(self) -> None:
+        """Wait until all submitted work is done."""
+        self.queue.read_buffer(self._fence)
+
+    # what passes need again and again
+
+    def sampler(self, name: str) -> Any:
+        if name not in self._samplers:
+            if name not in SAMPLERS:
+                raise wgsl.WgslError(f"no sampler is called '{name}' (known: {', '.join(SAMPLERS)})")
+            self._samplers[name] = self.device.create_sampler(**SAMPLERS[name])
+        return self._samplers[name]
+
+    def shader(self, module: wgsl.Module) -> Any:
+        """The compiled module. Raises WgslError with the place in the file that is wrong."""
+        import wgpu
+
+        if module.source not in self._shaders:
+            try:
+                self._shaders[module.source] = self.device.create_shader_module(code=module.source, label=module.name)
+            except wgpu.GPUError as error:
+                raise wgsl.WgslError(module.explain(str(error))) from None
+        return self._shaders[module.source]
+
+    def pipeline(self, key: Any, make: Any) -> Any:
+        """The pipeline of complete state `key`, made by `make()` the first time, with its bind group layout."""
+        if key not in self._pipelines:
+            pipeline = make()
+            self._pipelines[key] = (pipeline, pipeline.get_bind_group_layout(0))
+        return self._pipelines[key]
+
+    def acquire(self, key: TextureKey) -> Any:
+        """A texture from the pool. Its content is undefined."""
+        if self._free[key]:
+            return self._free[key].pop()
+        return self.device.create_texture(size=key.size, format=key.format, usage=key.usage)
+
+    def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Any, Any]:
+        """A buffer of at least `nbytes` from the pool, and the key to give it back with."""
+        key = (1 << max(nbytes - 1, 255).bit_length(), usage)
+        if self._free[key]:
+            return self._free[key].pop(), key
+        return self.device.create_buffer(size=key[0], usage=usage), key
+
+    def release(self, key: Any, resource: Any) -> None:
+        """Give a texture or buffer back to the pool."""
+        self._free[key].append(resource)
+
+
+@lru_cache(maxsize=1)
+def default_gpu() -> Gpu:
+    """The device that the commands share."""
+    return Gpu()

@@ -1,0 +1,557 @@
+"""The render graph: declare passes, cull back from what is wanted, pool, run, time.
+
+A pass is a WGSL module called by the names of its bindings; what it gives back are handles to what it writes:
+
+    blurred = graph.draw("texture_space/blur", source=irradiance, stretch=stretch, params=dict(sigma=0.7, axis=0))
+
+Declaration order is execution order. A graph is built for one frame and dropped; nothing is allocated until `run`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
+
+from wgsss import wgsl
+from wgsss.gpu import FORMATS, Gpu, TextureKey
+from wgsss.wgsl import Binding, Module, WgslError
+
+Size = int | tuple[int, int] | tuple[int, int, int]
+_UPLOAD_ALIGNMENT = 256  # the largest minimum that WebGPU allows for offsets of uniform and storage bindings
+
+
+@dataclass(eq=False)
+class Resource:
+    """A texture or buffer that passes of one graph write."""
+
+    name: str
+    format: str  # of a texture; empty for a buffer
+    size: tuple[int, int, int]  # width, height, layers; for a buffer (elements, 1, 1)
+    layout: wgsl.Layout | None = None  # of a buffer: its array
+    usage: int = 0
+    version: int = 0
+    drawn: set[int] = field(default_factory=set)  # layers that a raster pass has cleared and drawn
+    gpu: Any = None
+    key: Any = None
+
+    @property
+    def nbytes(self) -> int:
+        if self.layout is not None:
+            return self.size[0] * self.layout.size
+        return TextureKey(self.size, self.format, 0).nbytes
+
+
+@dataclass(frozen=True)
+class Handle:
+    """What a pass wrote: a resource as it is after that pass."""
+
+    resource: Resource
+    version: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in texels."""
+        return self.resource.size[:2]
+
+    @property
+    def format(self) -> str:
+        return self.resource.format
+
+    def __repr__(self) -> str:
+        return f"{self.resource.name}@{self.version}"
+
+
+@dataclass(eq=False)
+class Pass:
+    """One declared pass. `uploads` holds the packed bytes of arguments that are values, by binding name."""
+
+    name: str
+    module: Module
+    constants: dict[str, float]
+    reads: dict[str, Handle] = field(default_factory=dict)
+    writes: dict[str, Handle] = field(default_factory=dict)
+    imports: dict[str, Any] = field(default_factory=dict)
+    uploads: dict[str, bytes] = field(default_factory=dict)
+    state: Any = None  # _Draw or _Dispatch
+
+
+@dataclass(frozen=True)
+class _Draw:
+    targets: tuple[tuple[str, bool], ...]  # name in `writes`, whether earlier content is kept
+    depth: str | None  # name in `writes` or, where only tested, in `reads`
+    depth_compare: str
+    depth_write: bool
+    keep_depth: bool
+    cull: str
+    layer: int
+    indices: Any
+    count: int
+    instances: int
+
+
+@dataclass(frozen=True)
+class _Dispatch:
+    groups: tuple[int, int, int]
+
+
+class Graph:
+    """The passes of one frame.
+
+    After `run`: `times` (pass name -> ms, where timed), `clock` ("gpu timestamps" or "fenced wall clock"), `ran` and
+    `culled` (passes), `peak_bytes` (most transient bytes live at once). `str(graph)` is the table of all that.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self.gpu = gpu
+        self.passes: list[Pass] = []
+        self.ran: list[Pass] = []
+        self.culled: list[Pass] = []
+        self.times: dict[str, float] = {}
+        self.clock = "gpu timestamps" if gpu.has_timestamps else "fenced wall clock"
+        self.peak_bytes = 0
+        self._names: dict[str, int] = {}
+        self._held: list[Resource] = []
+
+    def __del__(self) -> None:
+        for resource in self._held:
+            self.gpu.release(resource.key, resource.gpu)
+
+    # declaring
+
+    def texture(self, name: str, size: tuple[int, int, int], texture_format: str) -> Handle:
+        """A texture (width, height, layers) that several passes will write in turn, each through `into` or `depth`."""
+        return Handle(Resource(name, texture_format, size), 0)
+
+    def draw(
+        self,
+        module: str,
+        *,
+        size: tuple[int, int] | None = None,
+        indices: Any = None,
+        count: int = 3,
+        instances: int = 1,
+        into: Handle | Mapping[str, Handle] | None = None,
+        depth: Handle | Literal["new"] | None = None,
+        depth_compare: str = "less",
+        depth_write: bool = True,
+        cull: str = "none",
+        layer: int = 0,
+        constants: Mapping[str, float] | None = None,
+        label: str = "",
+        **bindings: Any,
+    ) -> Any:
+        """Declare a raster pass of `wgsl/<module>.wgsl`; without `indices` (a u32 index buffer) a full-screen triangle.
+
+        Args:
+            size: of the targets made, in texels; by default that of `into`, `depth` or the first texture bound.
+            into: targets to draw onto instead of new, cleared ones (a handle, or handles by output name).
+            depth: "new" for a cleared depth buffer, or the handle of one to test against and, with `depth_write`, write.
+            layer: of array textures given as `into` or `depth`.
+            bindings: the module's bindings by name: handles, GPU resources that persist, or values to pack and upload.
+
+        Returns:
+            The handle written; where there are several, a namespace by output name, `depth` among them.
+
+        Raises:
+            WgslError: for a missing, unknown or ill-typed name, listing what the module wants and what it was given.
+        """
+        loaded = wgsl.load(module)
+        item = self._declare(loaded, label, constants, bindings)
+        given = dict(into) if isinstance(into, Mapping) else {t[0]: into for t in loaded.targets[:1] if into is not None}
+        if size is None:
+            size = self._default_size([*given.values(), depth, *item.reads.values()], loaded)
+        targets = []
+        for name, texture_format in loaded.targets:
+            if name in given:
+                self._write_on(item, name, given[name])
+            else:
+                self._write_new(item, name, Resource(f"{item.name}.{name}", texture_format, (*size, 1)))
+            targets.append((name, layer in item.writes[name].resource.drawn))
+        if depth == "new":
+            self._write_new(item, "depth", Resource(f"{item.name}.depth", "depth32float", (*size, 1)))
+        elif isinstance(depth, Handle) and depth_write:
+            self._write_on(item, "depth", depth)
+        elif isinstance(depth, Handle):
+            item.reads["depth"] = self._checked(depth)
+        depth_name = "depth" if depth is not None else None
+        keep_depth = "depth" in item.writes and layer in item.writes["depth"].resource.drawn
+        import wgpu
+
+        for handle in item.writes.values():
+            handle.resource.usage |= wgpu.TextureUsage.RENDER_ATTACHMENT
+            handle.resource.drawn.add(layer)
+        if indices is not None and count == 3:
+            count = indices.size // 4
+        item.state = _Draw(tuple(targets), depth_name, depth_compare, depth_write, keep_depth, cull, layer, indices, count,
+                           instances)  # fmt: skip
+        return self._outputs(item)
+
+    def dispatch(
+        self,
+        module: str,
+        *,
+        size: Size | None = None,
+        constants: Mapping[str, float] | None = None,
+        label: str = "",
+        **bindings: Any,
+    ) -> Any:
+        """Declare a compute pass of `wgsl/<module>.wgsl` over `size` (items, or width, height[, layers]).
+
+        Storage that the module writes and that is not among `bindings` is made with `size`; a handle given for it is
+        written in place. Returns and raises as `draw`.
+        """
+        loaded = wgsl.load(module)
+        written = {n: b for n, b in loaded.bindings.items() if b.access in ("write", "read_write") and b.space != "sampler"}
+        item = self._declare(loaded, label, constants, bindings, made=set(written) - set(bindings))
+        if size is None:
+            size = self._default_size([bindings[n] for n in written if isinstance(bindings.get(n), Handle)] or list(item.reads.values()), loaded)
+        extent = (size, 1, 1) if isinstance(size, int) else (*size, 1)[:3]
+        for name, binding in written.items():
+            handle = item.reads.get(name)
+            if handle is not None:
+                self._write_on(item, name, handle)
+            elif name not in item.imports:
+                resource = Resource(f"{item.name}.{name}", binding.format, extent)
+                if binding.space == "storage":
+                    resource.layout = loaded.layout(binding.type)
+                    resource.size = (extent[0] * extent[1] * extent[2], 1, 1)
+                self._write_new(item, name, resource)
+        groups = [-(-n // w) for n, w in zip(extent, loaded.workgroup_size(constants or {}), strict=True)]
+        item.state = _Dispatch((groups[0], groups[1], groups[2]))
+        return self._outputs(item)
+
+    def _declare(self, module: Module, label: str, constants: Any, bindings: dict[str, Any], made: set[str] = frozenset()) -> Pass:  # type: ignore[assignment] # fmt: skip
+        name = f"{module.name} {label}".strip()
+        self._names[name] = self._names.get(name, 0) + 1
+        item = Pass(name if self._names[name] == 1 else f"{name} #{self._names[name]}", module, dict(constants or {}))
+        wanted = {n: b for n, b in module.bindings.items() if b.space != "sampler" and n not in made}
+        if set(bindings) != set(wanted):
+            raise WgslError(_mismatch(module, wanted, bindings))
+        unknown = set(item.constants) - set(module.overrides)
+        if unknown:
+            raise WgslError(f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {', '.join(module.overrides)})")
+        for key, value in bindings.items():
+            self._bind(item, wanted[key], value)
+        self.passes.append(item)
+        return item
+
+    def _bind(self, item: Pass, binding: Binding, value: Any) -> None:
+        import wgpu
+
+        wants_texture = binding.space in ("texture", "storage_texture")
+        if isinstance(value, Handle):
+            if wants_texture == (value.resource.layout is not None):
+                raise WgslError(f"{item.module.name}: '{binding.name}' is a {binding.type}, got {value!r}")
+            if value.version == 0 and binding.access == "read":
+                raise WgslError(f"{item.module.name}: '{binding.name}' is {value!r}, which no pass has written")
+            value.resource.usage |= {"texture": wgpu.TextureUsage.TEXTURE_BINDING, "storage_texture": wgpu.TextureUsage.STORAGE_BINDING}.get(binding.space, wgpu.BufferUsage.STORAGE)
+            item.reads[binding.name] = self._checked(value)
+        elif isinstance(value, wgpu.GPUTexture if wants_texture else wgpu.GPUBuffer):
+            item.imports[binding.name] = value
+        elif not wants_texture and not isinstance(value, wgpu.GPUTexture):
+            item.uploads[binding.name] = item.module.layout(binding.type).pack(value)
+        else:
+            raise WgslError(f"{item.module.name}: '{binding.name}' is a {binding.type}, got {type(value).__name__}")
+
+    def _checked(self, handle: Handle) -> Handle:
+        if handle.version != handle.resource.version:
+            raise WgslError(f"{handle!r} is stale: a later pass wrote {handle.resource.name}@{handle.resource.version}")
+        return handle
+
+    def _default_size(self, handles: list[Any], module: Module) -> tuple[int, int]:
+        for handle in handles:
+            if isinstance(handle, Handle) and handle.format:
+                return handle.size
+        raise WgslError(f"{module.name}: give a size, since no texture says it")
+
+    def _write_new(self, item: Pass, name: str, resource: Resource) -> None:
+        import wgpu
+
+        resource.version = 1
+        resource.usage |= wgpu.BufferUsage.STORAGE if resource.layout else 0
+        if resource.format and name in item.module.bindings:
+            resource.usage |= wgpu.TextureUsage.STORAGE_BINDING
+        item.writes[name] = Handle(resource, 1)
+
+    def _write_on(self, item: Pass, name: str, handle: Handle) -> None:
+        if self._checked(handle).version:
+            item.reads.setdefault(name, handle)
+        handle.resource.version += 1
+        item.writes[name] = Handle(handle.resource, handle.version + 1)
+
+    @staticmethod
+    def _outputs(item: Pass) -> Any:
+        return next(iter(item.writes.values())) if len(item.writes) == 1 else SimpleNamespace(**item.writes)
+
+    # running
+
+    def run(self, *wanted: Handle, timed: bool = False) -> None:
+        """Run what the wanted handles need, in declaration order.
+
+        With `timed`, `times` is filled: from timestamps on hardware; on CPU adapters each pass is submitted alone
+        and fenced.
+        """
+        import wgpu
+
+        needed = set(wanted)
+        for handle in wanted:
+            handle.resource.usage |= wgpu.TextureUsage.COPY_SRC if handle.format else wgpu.BufferUsage.COPY_SRC
+        kept: list[Pass] = []
+        for item in reversed(self.passes):
+            if needed & set(item.writes.values()):
+                kept.append(item)
+                needed |= set(item.reads.values())
+        self.ran = kept[::-1]
+        chosen = set(self.ran)
+        self.culled = [p for p in self.passes if p not in chosen]
+        keep = {h.resource for h in wanted}
+        last_use = {h.resource: i for i, p in enumerate(self.ran) for h in (*p.reads.values(), *p.writes.values())}
+
+        arena, arena_key, offsets = self._upload()
+        live = 0
+        self.peak_bytes = 0
+        timer = _Timer(self, timed)
+        for i, item in enumerate(self.ran):
+            for handle in (*item.reads.values(), *item.writes.values()):
+                if handle.resource.gpu is None:
+                    self._allocate(handle.resource)
+                    live += handle.resource.nbytes
+            self.peak_bytes = max(self.peak_bytes, live)
+            timer.encode(i, item, self._bind_group(item, arena, offsets))
+            for handle in {*item.reads.values(), *item.writes.values()}:
+                resource = handle.resource
+                if last_use[resource] == i and resource.gpu is not None and resource not in keep:
+                    self.gpu.release(resource.key, resource.gpu)
+                    resource.gpu = None
+                    live -= resource.nbytes
+        timer.finish()
+        if arena is not None:
+            self.gpu.release(arena_key, arena)
+        self._held += [r for r in keep if r.gpu is not None and r not in self._held]
+
+    def read(self, handle: Handle) -> np.ndarray:
+        """What a wanted handle holds after `run`: texels (height, width, channels), or a buffer's elements."""
+        if handle.resource.gpu is None:
+            raise WgslError(f"{handle!r} was not among the handles that run() was asked for")
+        if handle.resource.layout is None:
+            return self.gpu.read_texture(handle.resource.gpu)
+        raw = self.gpu.queue.read_buffer(handle.resource.gpu, 0, handle.resource.nbytes)
+        return np.frombuffer(raw, handle.resource.layout.dtype)
+
+    def gpu_texture(self, handle: Handle) -> Any:
+        """The texture behind a wanted handle after `run`, held until this graph is dropped."""
+        return handle.resource.gpu
+
+    def _allocate(self, resource: Resource) -> None:
+        if resource.layout is not None:
+            resource.gpu, resource.key = self.gpu.acquire_buffer(resource.nbytes, resource.usage)
+        else:
+            resource.key = TextureKey(resource.size, resource.format, resource.usage)
+            resource.gpu = self.gpu.acquire(resource.key)
+
+    def _upload(self) -> tuple[Any, Any, dict[tuple[Pass, str], int]]:
+        """One buffer with all values that the kept passes were given, and the offset of each."""
+        import wgpu
+
+        offsets: dict[tuple[Pass, str], int] = {}
+        seen: dict[bytes, int] = {}
+        chunks, end = [], 0
+        for item in self.ran:
+            for name, data in item.uploads.items():
+                if data not in seen:
+                    seen[data] = end
+                    chunks.append(data + bytes(-len(data) % _UPLOAD_ALIGNMENT))
+                    end += len(chunks[-1])
+                offsets[item, name] = seen[data]
+        if not chunks:
+            return None, None, offsets
+        usage = wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST
+        arena, key = self.gpu.acquire_buffer(end, usage)
+        self.gpu.queue.write_buffer(arena, 0, b"".join(chunks))
+        return arena, key, offsets
+
+    def _bind_group(self, item: Pass, arena: Any, offsets: Mapping[tuple[Pass, str], int]) -> tuple[Any, Any]:
+        pipeline, layout = self.gpu.pipeline(*_pipeline(self.gpu, item))
+        entries = []
+        for name, binding in item.module.bindings.items():
+            resource: Any
+            if binding.space == "sampler":
+                resource = self.gpu.sampler(name)
+            elif name in item.uploads:
+                resource = {"buffer": arena, "offset": offsets[item, name], "size": len(item.uploads[name])}
+            else:
+                handle = item.reads.get(name) or item.writes.get(name)
+                resource = handle.resource.gpu if handle else item.imports[name]
+                if binding.space in ("texture", "storage_texture"):
+                    resource = resource.create_view(dimension=_view_dimension(binding.type))
+                elif handle:
+                    resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
+            entries.append({"binding": binding.number, "resource": resource})
+        group = self.gpu.device.create_bind_group(layout=layout, entries=entries) if entries else None
+        return pipeline, group
+
+    def __str__(self) -> str:
+        rows = [("pass", "reads", "writes", "ms")]
+        for item in self.passes:
+            ms = f"{self.times[item.name]:.2f}" if item.name in self.times else "culled" if item in self.culled else ""
+            reads = " ".join(sorted(item.reads)) or "-"
+            writes = " ".join(f"{n}:{h.size[0]}x{h.size[1]}:{h.format or 'buffer'}" for n, h in item.writes.items())
+            rows.append((item.name, reads, writes, ms))
+        widths = [max(len(row[c]) for row in rows) for c in range(4)]
+        lines = ["  ".join([*(cell.ljust(w) for cell, w in zip(row[:3], widths[:3], strict=True)), row[3].rjust(widths[3])]) for row in rows]
+        total = sum(self.times.values())
+        lines.append(f"{len(self.ran)} passes ran, {len(self.culled)} culled; {total:.2f} ms ({self.clock}); "
+                     f"{self.peak_bytes / 2**20:.1f} MiB of transients live at most")  # fmt: skip
+        return "\n".join(lines)
+
+    def dot(self) -> str:
+        """The graph for Graphviz: passes are boxes, grey where culled; edges carry the resource."""
+        lines = ["digraph frame {", "  rankdir=LR; node [shape=box, fontname=sans];"]
+        writer = {handle: item.name for item in self.passes for handle in item.writes.values()}
+        for item in self.passes:
+            ms = f"\\n{self.times[item.name]:.2f} ms" if item.name in self.times else ""
+            style = ", color=grey, fontcolor=grey" if item in self.culled else ""
+            lines.append(f'  "{item.name}" [label="{item.name}{ms}"{style}];')
+            lines += [f'  "{writer[h]}" -> "{item.name}" [label="{n}"];' for n, h in item.reads.items() if h in writer]
+        return "\n".join([*lines, "}"]) + "\n"
+
+
+def _mismatch(module: Module, wanted: Mapping[str, Binding], given: Mapping[str, Any]) -> str:
+    parts = [f"{module.name} wants {', '.join(f'{n}: {b.type}' for n, b in wanted.items()) or 'nothing'}"]
+    parts.append(f"was given {', '.join(given) or 'nothing'}")
+    if missing := [n for n in wanted if n not in given]:
+        parts.append(f"missing: {', '.join(missing)}")
+    for name in (n for n in given if n not in wanted):
+        near = difflib.get_close_matches(name, list(wanted), n=1)
+        parts.append(f"unknown: {name}" + (f" (did you mean '{near[0]}'?)" if near else ""))
+    return "; ".join(parts)
+
+
+@lru_cache(maxsize=256)
+def _view_dimension(kind: str) -> str:
+    for suffix, dimension in (("cube_array", "cube-array"), ("cube", "cube"), ("2d_array", "2d-array"), ("3d", "3d")):
+        if kind.split("<")[0].endswith(suffix):
+            return dimension
+    return "2d"
+
+
+def _pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
+    """The key of a pass's pipeline, and the function that makes it."""
+    module, constants = item.module, item.constants
+    key: tuple[Any, ...] = (module.source, tuple(sorted(constants.items())))
+    if isinstance(item.state, _Dispatch):
+
+        def make() -> Any:
+            stage = {"module": gpu.shader(module), "entry_point": module.stages["compute"], "constants": constants}
+            return gpu.device.create_compute_pipeline(layout="auto", compute=stage, label=module.name)
+
+        return key, make
+    state: _Draw = item.state
+    formats = tuple(item.writes[name].format for name, _ in state.targets)
+    depth = (state.depth_compare, state.depth_write) if state.depth else None
+
+    def make() -> Any:
+        stage = {"module": gpu.shader(module), "constants": constants}
+        fragment = {**stage, "entry_point": module.stages["fragment"], "targets": [{"format": f} for f in formats]} if formats else None
+        return gpu.device.create_render_pipeline(
+            layout="auto",
+            label=module.name,
+            vertex={**stage, "entry_point": module.stages["vertex"], "buffers": []},
+            primitive={"topology": "triangle-list", "cull_mode": state.cull},
+            depth_stencil={"format": "depth32float", "depth_compare": depth[0], "depth_write_enabled": depth[1]} if depth else None,
+            fragment=fragment,
+        )
+
+    return (*key, formats, depth, state.cull), make
+
+
+class _Timer:
+    """Encodes passes, all into one submission or each fenced on its own, and times them where asked."""
+
+    def __init__(self, graph: Graph, timed: bool) -> None:
+        self.graph, self.gpu = graph, graph.gpu
+        self.stamps = timed and self.gpu.has_timestamps
+        self.walls = timed and not self.stamps
+        self.queries = self.gpu.device.create_query_set(type="timestamp", count=2 * max(len(graph.ran), 1)) if self.stamps else None
+        self.encoder: Any = None
+        if self.walls:
+            self.gpu.fence()
+
+    def encode(self, i: int, item: Pass, bound: tuple[Any, Any]) -> None:
+        if self.encoder is None:
+            self.encoder = self.gpu.device.create_command_encoder()
+        stamps: dict[str, Any] = {}
+        if self.stamps:
+            stamps = {"timestamp_writes": {"query_set": self.queries, "beginning_of_pass_write_index": 2 * i, "end_of_pass_write_index": 2 * i + 1}}
+        start = time.perf_counter()
+        (_encode_dispatch if isinstance(item.state, _Dispatch) else _encode_draw)(self.encoder, item, *bound, stamps)
+        if self.walls:
+            self._submit()
+            self.gpu.fence()
+            self.graph.times[item.name] = 1e3 * (time.perf_counter() - start)
+
+    def _submit(self) -> None:
+        self.gpu.queue.submit([self.encoder.finish()])
+        self.encoder = None
+
+    def finish(self) -> None:
+        import wgpu
+
+        if self.encoder is None:
+            return
+        if not self.stamps:
+            return self._submit()
+        count = 2 * len(self.graph.ran)
+        resolved = self.gpu.device.create_buffer(size=8 * count, usage=wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC)
+        self.encoder.resolve_query_set(self.queries, 0, count, resolved, 0)
+        self._submit()
+        ticks = np.frombuffer(self.gpu.queue.read_buffer(resolved), np.uint64).reshape(-1, 2)  # nanoseconds
+        self.graph.times = {p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.graph.ran, ticks, strict=True)}
+
+
+def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
+    compute = encoder.begin_compute_pass(label=item.name, **stamps)
+    compute.set_pipeline(pipeline)
+    compute.set_bind_group(0, group)
+    compute.dispatch_workgroups(*item.state.groups)
+    compute.end()
+
+
+def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
+    state: _Draw = item.state
+
+    def view(handle: Handle) -> Any:
+        return handle.resource.gpu.create_view(dimension="2d", base_array_layer=state.layer, array_layer_count=1)
+
+    colors = [
+        {"view": view(item.writes[name]), "load_op": "load" if kept else "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
+        for name, kept in state.targets
+    ]
+    depth = None
+    if state.depth:
+        handle = item.writes.get(state.depth) or item.reads[state.depth]
+        depth = {"view": view(handle)}
+        if state.depth_write:
+            depth |= {"depth_load_op": "load" if state.keep_depth else "clear", "depth_store_op": "store", "depth_clear_value": 1.0}
+        else:
+            depth |= {"depth_read_only": True}
+    render = encoder.begin_render_pass(color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps)
+    render.set_pipeline(pipeline)
+    if group is not None:
+        render.set_bind_group(0, group)
+    if state.indices is not None:
+        render.set_index_buffer(state.indices, "uint32")
+        render.draw_indexed(state.count, state.instances)
+    else:
+        render.draw(state.count, state.instances)
+    render.end()
+
+
+__all__ = ["FORMATS", "Graph", "Handle", "Pass", "Resource"]

@@ -1,0 +1,349 @@
+"""WGSL as the only declaration: imports, bindings and host-shareable layouts read from the text of a module.
+
+Imports follow the smallest subset of WESL: `import package::fresnel::{schlick};` includes the whole file
+`wgsl/fresnel.wgsl` once, before the text that asked for it, and checks that the names exist there. Render targets
+carry their format as an alias of the output's type (`@location(0) M_front: RGBA16Float`, see `wgsl/targets.wgsl`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_PACKAGE = Path(__file__).parent
+ROOT = _PACKAGE / "wgsl" if (_PACKAGE / "wgsl").is_dir() else _PACKAGE.parent / "wgsl"
+
+_IMPORT = re.compile(r"^\s*import\s+package((?:::\w+)+?)(?:::\{([^}]*)\}|::(\w+));[^\S\n]*$", re.M)
+_DECLARATION = re.compile(r"\b(?:fn|struct|alias|const|override|var)\s*(?:<[^>]*>)?\s*(\w+)")
+_BINDING = re.compile(r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var\s*(?:<\s*(\w+)\s*(?:,\s*(\w+)\s*)?>)?\s*(\w+)\s*:\s*([^;]+);")
+_STRUCT = re.compile(r"\bstruct\s+(\w+)\s*\{([^}]*)\}")
+_FIELD = re.compile(r"((?:@\w+(?:\([^)]*\))?\s*)*)(\w+)\s*:\s*((?:[^,<]|<(?:[^<>]|<[^>]*>)*>)+)(?:,|$)")
+_ALIAS = re.compile(r"\balias\s+(\w+)\s*=\s*([^;]+);")
+_CONST = re.compile(r"\bconst\s+(\w+)\s*(?::\s*\w+\s*)?=\s*(\d+)[ui]?\s*;")
+_OVERRIDE = re.compile(r"\boverride\s+(\w+)\s*(?::\s*\w+\s*)?(?:=\s*([^;]+))?;")
+_ENTRY = re.compile(r"@(vertex|fragment|compute)\b([^{;]*?)\bfn\s+(\w+)\s*\(")
+_WORKGROUP = re.compile(r"@workgroup_size\(([^)]*)\)")
+_RETURNS = re.compile(r"@fragment\s+fn\s+\w+\s*\([^{]*?->\s*(\w+)\s*\{", re.S)
+_SCALARS = {"f32": "<f4", "i32": "<i4", "u32": "<u4", "f16": "<f2"}
+_SHORT = {"f": "f32", "i": "i32", "u": "u32", "h": "f16"}
+
+
+class WgslError(Exception):
+    """A fault in a module or in what was given to it: the message names the file and, where known, the line."""
+
+
+def _strip_comments(text: str) -> str:
+    """The text with comments blanked out, newlines kept, so that line numbers hold."""
+    text = re.sub(r"/\*.*?\*/", lambda m: re.sub(r"[^\n]", " ", m.group()), text, flags=re.S)
+    return re.sub(r"//[^\n]*", "", text)
+
+
+def _round_up(value: int, multiple: int) -> int:
+    return -(-value // multiple) * multiple
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where WGSL puts a host-shareable type (WGSL §14.4): size and alignment in bytes, and the matching numpy dtype.
+
+    A runtime-sized array has `count` None, and `size` is that of one element.
+    """
+
+    text: str
+    size: int
+    align: int
+    dtype: np.dtype
+    fields: tuple[tuple[str, Layout, int], ...] = ()  # of a struct: name, layout, offset
+    element: Layout | None = None  # of an array
+    count: int | None = 0
+    columns: int = 0  # of a matrix
+
+    def pack(self, value: Any) -> bytes:
+        """The bytes of `value`: numbers and arrays for scalars, vectors and (mathematical, row by row) matrices, dicts
+        for structs, sequences for arrays; for an array of structs also a structured array or a dict of arrays.
+
+        Raises WgslError where names, shapes or counts do not fit.
+        """
+        runtime_sized = self.element is not None and self.count is None
+        if runtime_sized and _length(value, self.text) == 0:
+            return bytes(self.size)  # a binding cannot be empty: one element of zeros
+        out = np.zeros(_length(value, self.text) if runtime_sized else (), self.dtype)
+        self._assign(out, value, self.text)
+        return out.tobytes()
+
+    def _assign(self, out: np.ndarray, value: Any, path: str) -> None:
+        """Write values into `out`, an array of this layout's dtype or a view of it."""
+        if self.fields:
+            value = _columns(value, path)
+            wanted = {name for name, _, _ in self.fields}
+            if set(value) != wanted:
+                raise WgslError(f"{path}: wants {', '.join(sorted(wanted))}; got {', '.join(sorted(value))}")
+            for name, layout, _ in self.fields:
+                layout._assign(out[name], value[name], f"{path}.{name}")
+        elif self.element is not None:
+            padded = self.element.dtype.itemsize != _round_up(self.element.size, self.element.align)
+            self.element._assign(out["value"] if padded else out, value, path)
+        else:
+            values = np.asarray(value)
+            if self.columns:  # a mathematical (rows, columns) matrix is stored by columns
+                values = np.swapaxes(values, -1, -2) if values.ndim >= 2 else values
+                out = out[..., : int(self.text[5])]
+            if values.shape != out.shape:
+                raise WgslError(f"{path}: expected shape {out.shape} for {self.text}, got {values.shape}")
+            out[...] = values
+
+
+def _columns(value: Any, path: str) -> Mapping[str, Any]:
+    """A struct's value, or an array of them, by field name."""
+    if isinstance(value, np.ndarray) and value.dtype.names:
+        return {name: value[name] for name in value.dtype.names}
+    if isinstance(value, Sequence) and value and isinstance(value[0], Mapping):
+        return {name: np.stack([np.asarray(v[name]) for v in value]) for name in value[0]}
+    if isinstance(value, Mapping):
+        return value
+    raise WgslError(f"{path}: expected a dict, got {type(value).__name__}")
+
+
+def _length(value: Any, path: str) -> int:
+    if not isinstance(value, Mapping):
+        return len(value)
+    lengths = {len(v) for v in value.values()}
+    if len(lengths) != 1:
+        raise WgslError(f"{path}: the fields differ in length: {sorted(lengths)}")
+    return lengths.pop()
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One resource that a module declares. `access` is read, write or read_write; `space` is uniform, storage,
+    texture, storage_texture or sampler; `format` is a storage texture's."""
+
+    name: str
+    group: int
+    number: int
+    space: str
+    access: str
+    type: str
+    format: str = ""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A WGSL file with its imports resolved, and what it declares.
+
+    Attributes:
+        name: path below `wgsl/`, without the suffix.
+        source: the whole text, imports included.
+        lines: for each line of `source`, the file and line that it came from.
+    """
+
+    name: str
+    source: str
+    lines: tuple[tuple[str, int], ...]
+    _layouts: dict[str, Layout] = field(default_factory=dict, compare=False, repr=False)
+
+    @cached_property
+    def _clean(self) -> str:
+        return _strip_comments(self.source)
+
+    @cached_property
+    def aliases(self) -> dict[str, str]:
+        return {name: re.sub(r"\s+", "", kind) for name, kind in _ALIAS.findall(self._clean)}
+
+    @cached_property
+    def constants(self) -> dict[str, int]:
+        """Integer constants, which array and workgroup sizes may name."""
+        return {name: int(value) for name, value in _CONST.findall(self._clean)}
+
+    @cached_property
+    def overrides(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in _OVERRIDE.findall(self._clean))
+
+    @cached_property
+    def structs(self) -> dict[str, tuple[tuple[str, str, str], ...]]:
+        """Struct name -> (field name, type as written, attributes)."""
+        return {
+            name: tuple((f[1], re.sub(r"\s+", "", f[2]), f[0]) for f in _FIELD.findall(" ".join(body.split())))
+            for name, body in _STRUCT.findall(self._clean)
+        }
+
+    @cached_property
+    def stages(self) -> dict[str, str]:
+        """Stage (vertex, fragment, compute) -> entry point."""
+        return {stage: name for stage, _, name in _ENTRY.findall(self._clean)}
+
+    def workgroup_size(self, overrides: Mapping[str, float]) -> tuple[int, int, int]:
+        match = _WORKGROUP.search(self._clean)
+        if not match:
+            raise WgslError(f"{self.name}: no @workgroup_size")
+        defaults = {name: self._integer(value, {}) for name, value in _OVERRIDE.findall(self._clean) if value[:1].isdigit() and "." not in value}
+        known = {**self.constants, **defaults, **{name: int(value) for name, value in overrides.items()}}
+        sizes = [self._integer(p.strip(), known) for p in match.group(1).split(",") if p.strip()]
+        x, y, z = (*sizes, 1, 1)[:3]
+        return x, y, z
+
+    def _integer(self, text: str, known: Mapping[str, int]) -> int:
+        text = text.strip().rstrip("ui") if text.strip()[:1].isdigit() else text.strip()
+        if text.isdigit():
+            return int(text)
+        if text in known:
+            return known[text]
+        raise WgslError(f"{self.name}: '{text}' is not an integer constant")
+
+    @cached_property
+    def bindings(self) -> dict[str, Binding]:
+        found = {}
+        for group, number, space, access, name, kind in _BINDING.findall(self._clean):
+            kind = self.resolve(re.sub(r"\s+", "", kind))
+            fmt = ""
+            if space:
+                access = access or "read"
+            elif kind.startswith("sampler"):
+                space, access = "sampler", "read"
+            elif kind.startswith("texture_storage"):
+                fmt, access = kind[kind.index("<") + 1 : -1].split(",")
+                space = "storage_texture"
+            else:
+                space, access = "texture", "read"
+            found[name] = Binding(name, int(group), int(number), space, access, kind, fmt)
+        return found
+
+    @cached_property
+    def targets(self) -> tuple[tuple[str, str], ...]:
+        """The fragment output: (field name, texture format) by location; the format is the field's type, an alias."""
+        match = _RETURNS.search(self._clean)
+        if not match:
+            return ()
+        fields = self.structs.get(match.group(1), ())
+        found = []
+        for name, kind, attributes in fields:
+            if "@location" not in attributes:
+                continue
+            if not re.fullmatch(r"(RGBA|RG|R)\d+(Float|Uint|Unorm|UnormSrgb)", kind):
+                raise WgslError(f"{self.name}: output '{name}: {kind}' does not name a render target's format")
+            found.append((int(re.search(r"@location\((\d+)\)", attributes).group(1)), name,  # type: ignore[union-attr]
+                          kind.lower().replace("srgb", "-srgb")))  # fmt: skip
+        return tuple((name, fmt) for _, name, fmt in sorted(found))
+
+    def resolve(self, kind: str) -> str:
+        """The type with aliases replaced."""
+        return re.sub(r"\b[A-Za-z_]\w*\b", lambda m: self.resolve(self.aliases[m.group()])
+                      if m.group() in self.aliases else m.group(), kind)  # fmt: skip
+
+    def layout(self, kind: str) -> Layout:
+        """The layout of a host-shareable type as this module declares it."""
+        kind = self.resolve(re.sub(r"\s+", "", kind))
+        if kind not in self._layouts:
+            self._layouts[kind] = self._compute_layout(kind)
+        return self._layouts[kind]
+
+    def _compute_layout(self, kind: str) -> Layout:
+        if kind in _SCALARS:
+            dtype = np.dtype(_SCALARS[kind])
+            return Layout(kind, dtype.itemsize, dtype.itemsize, dtype)
+        if match := re.fullmatch(r"atomic<(\w+)>", kind):
+            return self._compute_layout(match.group(1))
+        if match := re.fullmatch(r"vec([234])(?:<(\w+)>|([fiuh]))", kind):
+            n, scalar = int(match[1]), np.dtype(_SCALARS[match[2] or _SHORT[match[3]]])
+            return Layout(kind, n * scalar.itemsize, (2 if n == 2 else 4) * scalar.itemsize, np.dtype((scalar, (n,))))
+        if match := re.fullmatch(r"mat([234])x([234])(?:<(\w+)>|([fh]))", kind):
+            columns, rows = int(match[1]), int(match[2])
+            scalar = np.dtype(_SCALARS[match[3] or _SHORT[match[4]]])
+            padded = 4 if rows == 3 else rows
+            dtype = np.dtype((scalar, (columns, padded)))
+            return Layout(kind, dtype.itemsize, padded * scalar.itemsize, dtype, columns=columns)
+        if match := re.fullmatch(r"array<(.+?)(?:,(\w+))?>", kind):
+            element = self.layout(match[1])
+            stride = _round_up(element.size, element.align)
+            count = self._integer(match[2], self.constants) if match[2] else None
+            dtype = _padded(element, stride)
+            if count is None:
+                return Layout(kind, stride, element.align, dtype, element=element, count=None)
+            return Layout(kind, stride * count, element.align, np.dtype((dtype, (count,))), element=element, count=count)
+        if kind in self.structs:
+            return self._struct_layout(kind)
+        raise WgslError(f"{self.name}: '{kind}' is not a host-shareable type declared here")
+
+    def _struct_layout(self, kind: str) -> Layout:
+        offset, align, fields = 0, 1, []
+        for name, member, attributes in self.structs[kind]:
+            layout = self.layout(member)
+            own_align, own_size = layout.align, layout.size
+            if match := re.search(r"@align\((\d+)\)", attributes):
+                own_align = int(match[1])
+            if match := re.search(r"@size\((\d+)\)", attributes):
+                own_size = int(match[1])
+            offset = _round_up(offset, own_align)
+            fields.append((name, layout, offset))
+            offset, align = offset + own_size, max(align, own_align)
+        size = _round_up(offset, align)
+        dtype = np.dtype({"names": [f[0] for f in fields], "formats": [f[1].dtype for f in fields],
+                          "offsets": [f[2] for f in fields], "itemsize": size})  # type: ignore[call-overload] # fmt: skip
+        return Layout(kind, size, align, dtype, tuple(fields))
+
+    def explain(self, message: str) -> str:
+        """A compiler's message with its line numbers mapped back: `wgsl:12:3` becomes `blur.wgsl:4:3`."""
+
+        def place(match: re.Match[str]) -> str:
+            line = int(match.group(1))
+            path, number = self.lines[min(line, len(self.lines)) - 1]
+            return f"{path}:{number}:{match.group(2)}"
+
+        return re.sub(r"(?:wgsl)?:(\d+):(\d+)", place, message)
+
+
+def _padded(layout: Layout, stride: int) -> np.dtype:
+    if layout.dtype.itemsize == stride:
+        return layout.dtype
+    return np.dtype({"names": ["value"], "formats": [layout.dtype], "offsets": [0], "itemsize": stride})
+
+
+def _resolve(name: str, root: Path, done: dict[str, str], chain: tuple[str, ...], asked_by: str) -> list[tuple[str, str, int]]:
+    """Lines of module `name` and of what it imports, each once: (text, file, line)."""
+    if name in chain:
+        raise WgslError(f"{asked_by}: circular import {' -> '.join((*chain, name))}")
+    if name in done:
+        return []
+    path = root / f"{name}.wgsl"
+    if not path.is_file():
+        raise WgslError(f"{asked_by}: no module '{name}' ({name}.wgsl not found)")
+    text = path.read_text()
+    clean = _strip_comments(text)
+    out: list[tuple[str, str, int]] = []
+    for match in _IMPORT.finditer(clean):
+        parts = match.group(1).strip(":").split("::")
+        line = clean.count("\n", 0, match.end()) + 1
+        where = f"{name}.wgsl:{line}"
+        names = match.group(2) if match.group(2) is not None else match.group(3)
+        wanted = [n.strip() for n in names.split(",") if n.strip()]
+        target = "/".join(parts)
+        out += _resolve(target, root, done, (*chain, name), where)
+        missing = [n for n in wanted if n not in _DECLARATION.findall(done[target])]
+        if missing:
+            raise WgslError(f"{where}: {target}.wgsl does not declare {', '.join(missing)}")
+    done[name] = clean
+    kept = text.split("\n")
+    for match in _IMPORT.finditer(clean):
+        for i in range(clean.count("\n", 0, match.start()), clean.count("\n", 0, match.end()) + 1):
+            kept[i] = "" if "import" in kept[i] or not kept[i].strip() else kept[i]
+    return out + [(line, f"{name}.wgsl", i + 1) for i, line in enumerate(kept)]
+
+
+def load(name: str, root: Path = ROOT) -> Module:
+    """The module `wgsl/<name>.wgsl` with its imports.
+
+    Raises WgslError for a missing file, an unknown imported name or a circle of imports, with file and line.
+    """
+    return _load(name, root)
+
+
+@lru_cache(maxsize=None)
+def _load(name: str, root: Path) -> Module:
+    lines = _resolve(name, root, {}, (), name)
+    return Module(name, "\n".join(line for line, _, _ in lines), tuple((path, n) for _, path, n in lines))
