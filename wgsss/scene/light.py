@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.errors import InputError
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
+from wgsss.scene.images import read_radiance
 
 
 @dataclass(frozen=True)
@@ -107,13 +109,17 @@ class EnvironmentLight:
     def __post_init__(self) -> None:
         checks.triple(self, "radiance", 0)
         checks.number(self, "rotation")
+        if self.file is not None and not isinstance(self.file, str):
+            raise InputError(f"file must be the path of a .hdr or .exr image, not {self.file!r}")
 
     def pixels(self) -> npt.NDArray[np.float32]:
         """float32 (H, W, 3): radiance by latitude (top row +y) and longitude, before `rotation`; 1 x 1 without a file.
 
         Negative values are clamped to zero. Raises InputError for a file that is missing, damaged or holds NaN.
         """
-        raise NotImplementedError
+        if self.file is None:
+            return np.array([[self.radiance]], np.float32)
+        return read_radiance(self.file) * np.asarray(self.radiance, np.float32)
 
 
 Light = DirectionalLight | PointLight | RectLight | SphereLight | EnvironmentLight
