@@ -1,0 +1,35 @@
+# Every target sets up what it needs; `make help` lists them.
+
+XDG_RUNTIME_DIR ?= /tmp
+export XDG_RUNTIME_DIR # unset, it makes Vulkan drivers print noise
+
+BIN := .venv/bin
+DEMO := ear milk gyroid statue leaf
+
+.PHONY: help setup demo test lint clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile
+
+setup: ## virtual environment, dependencies and, where there is none, a software Vulkan driver
+	@.ci/setup
+
+demo: setup ## render pictures into out/
+	@mkdir -p out
+	$(BIN)/wgsss render ear --method lambert --size 512x512 -o out/ear-lambert.png
+	@for scene in $(DEMO); do \
+		(set -x; $(BIN)/wgsss render $$scene --method deon07 --size 512x512 -o out/$$scene.png) || exit 1; \
+	done
+	@echo "Pictures: $(CURDIR)/out (ear.png beside ear-lambert.png shows what the diffusion does)"
+
+test: setup ## run the tests
+	@$(BIN)/pytest -q --durations=10
+
+lint: setup ## check style and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+clean: ## remove what the targets made
+	rm -rf .venv out dist build .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
