@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+import warnings
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
+from wgsss.scene.material import Maps
 
 Array = npt.NDArray[Any]
+
+# A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
+# or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
+OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,3 +108,69 @@ class Mesh:
         if np.shape(positions) != self.positions.shape:
             raise InputError(f"{self.name}: a deformation must keep {len(self.positions)} positions")
         return replace(self, positions=positions, corner_normals=None)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMesh:
+    """What a mesh file holds: the surface, and the textures of its material."""
+
+    mesh: Mesh
+    maps: Maps = field(default_factory=Maps)
+
+
+def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: float | None = None) -> LoadedMesh:
+    """Read a triangle mesh from a .ply, .obj, .stl, .off, .glb or .gltf file.
+
+    `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
+    others. `size_mm` scales the longest side of the bounding box to a length, whatever the unit.
+
+    Several parts, placed by the file's scene graph, become one mesh. Textures (base colour, normal, specular) are kept
+    where all parts share them; constant colours of the file's materials are not. Normals are kept where they are not
+    smooth. Degenerate and duplicate faces and unused vertices are dropped, faces wound inwards turned over and holes
+    counted, all of it told in one warning.
+
+    Raises InputError, naming the file, where it is missing, not what its ending says, empty, without an area, or holds
+    positions that are not finite, and for a scale that is not positive.
+    """
+    from wgsss.scene.meshfile import MM_PER_UNIT, read_triangles
+    from wgsss.scene.repair import repair
+
+    path = Path(path)
+    for name, value in (("mm_per_unit", mm_per_unit), ("size_mm", size_mm)):
+        if value is not None and not 0 < value < math.inf:
+            raise InputError(f"{path}: {name} must be above 0, not {value:g}")
+    file = read_triangles(path)
+    bad = int((~np.isfinite(file.positions)).any(axis=1).sum())
+    if bad:
+        raise InputError(f"{path}: {bad} of {len(file.positions)} positions are not finite numbers")
+    used = file.positions[np.unique(file.faces)]
+    side = float((used.max(axis=0) - used.min(axis=0)).max())
+    if side == 0:
+        raise InputError(f"{path}: the mesh has zero size")
+    scale = size_mm / side if size_mm is not None else mm_per_unit or MM_PER_UNIT.get(path.suffix.lower(), 1.0)
+    if not 1e-6 < side * scale < 1e9:
+        raise InputError(f"{path}: a size of {side * scale:g} mm is out of range (1e-6 to 1e9)")
+
+    fixed = repair((file.positions * scale).astype(np.float32), file.faces)
+    if not len(fixed.faces):
+        raise InputError(f"{path}: the mesh has no area: all {len(file.faces)} faces are degenerate")
+    notes = [*fixed.notes, *file.notes]
+    if fixed.welded and not file.splits:
+        notes.insert(0, f"{fixed.welded} duplicate vertices welded")
+    if notes:
+        warnings.warn(f"{path.name}: {'; '.join(notes)}", stacklevel=2)
+
+    corner_uvs = None if file.uvs is None else fixed.corners(file.uvs[file.faces])
+    mesh = Mesh(fixed.positions, fixed.faces, corner_uvs=corner_uvs, name=path.stem)
+    if file.normals is not None and not fixed.flipped.any():
+        mesh = replace(mesh, corner_normals=_own_normals(mesh, fixed.corners(file.normals[file.faces])))
+    return LoadedMesh(mesh, file.maps)
+
+
+def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
+    """A file's normals (F, 3, 3), made unit, with smooth ones where it has none; None where they are smooth anyway."""
+    length = np.linalg.norm(normals, axis=2, keepdims=True)
+    smooth = mesh.normals[mesh.faces]
+    unit = np.where(np.isfinite(length) & (length > 1e-6), normals / np.maximum(length, 1e-6), smooth)
+    far = np.einsum("ijk,ijk->ij", unit, smooth) < math.cos(math.radians(OWN_NORMALS_DEGREES))
+    return unit if far.mean() > OWN_NORMALS_SHARE else None
