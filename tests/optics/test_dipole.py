@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -22,7 +24,7 @@ def test_total_is_the_integral_over_the_plane(measured):
 
         # Without absorption a share (z_r + z_v) / 2r lies beyond r, here 1e-10: as far as the bar reaches.
         pieces = np.linspace(np.log(1e-7), np.log(1e10), 12)
-        total = sum(quad(ring, a, b, epsabs=1e-12, epsrel=1e-11)[0] for a, b in zip(pieces, pieces[1:], strict=False))
+        total = sum(quad(ring, a, b, epsabs=1e-12, epsrel=1e-11)[0] for a, b in pairwise(pieces))
         assert total == pytest.approx(dipole.total[channel], abs=1e-9)
 
 
