@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
+from wgsss.scene.loading import load_material, load_scene
 from wgsss.scene.material import MATERIALS, Maps, Material, material
-from wgsss.scene.mesh import Mesh
+from wgsss.scene.mesh import LoadedMesh, Mesh, load_mesh
 from wgsss.scene.scene import Object, Scene
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "DirectionalLight",
     "EnvironmentLight",
     "Light",
+    "LoadedMesh",
     "Maps",
     "Material",
     "Mesh",
@@ -24,5 +26,8 @@ __all__ = [
     "RectLight",
     "Scene",
     "SphereLight",
+    "load_material",
+    "load_mesh",
+    "load_scene",
     "material",
 ]

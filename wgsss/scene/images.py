@@ -61,11 +61,14 @@ def read_map(path: str | Path, mode: str) -> npt.NDArray[np.uint8]:
 
 def require_file(path: Path) -> None:
     """Raise InputError unless there is a file there that is not empty."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, not a file")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size == 0:
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', error)})") from None
+    if empty:
         raise InputError(f"{path}: the file is empty")
 
 

@@ -6,6 +6,7 @@ import math
 import warnings
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -137,8 +138,8 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
 
     path = Path(path)
     for name, value in (("mm_per_unit", mm_per_unit), ("size_mm", size_mm)):
-        if value is not None and not 0 < value < math.inf:
-            raise InputError(f"{path}: {name} must be above 0, not {value:g}")
+        if value is not None and not (isinstance(value, Real) and 0 < value < math.inf):
+            raise InputError(f"{path}: {name} must be a number above 0, not {value!r}")
     file = read_triangles(path)
     bad = int((~np.isfinite(file.positions)).any(axis=1).sum())
     if bad:

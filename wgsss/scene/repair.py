@@ -40,7 +40,7 @@ class Repaired:
 
 
 def weld(positions: Array) -> tuple[Array, Array]:
-    """Equal rows of float32 (V, 3) made one: those left, in order of first appearance, and for each row its new index."""
+    """Equal rows of float32 (V, 3) made one: those left, in order of appearance, and for each row its new index."""
     bits = np.ascontiguousarray(positions + np.float32(0), np.float32).view(np.uint32).astype(np.uint64)  # -0 is 0
     pair = np.unique((bits[:, 0] << np.uint64(32)) | bits[:, 1], return_inverse=True)[1].astype(np.uint64)
     _, first, inverse = np.unique((pair << np.uint64(32)) | bits[:, 2], return_index=True, return_inverse=True)

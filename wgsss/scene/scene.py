@@ -60,6 +60,12 @@ class Object:
         matrix[:3, 3] = self.translate
         return matrix
 
+    @cached_property
+    def placed(self) -> npt.NDArray[np.float64]:
+        """float64 (V, 3): the mesh's positions in world space, mm."""
+        world: npt.NDArray[np.float64] = self.mesh.positions @ self.matrix[:3, :3].T + self.matrix[:3, 3]
+        return world
+
     def at(self, time_s: float) -> Object:
         """The object as it is at a time in seconds, no longer moving."""
         if self.motion is None:
@@ -93,8 +99,8 @@ class Scene:
     @cached_property
     def bounds(self) -> npt.NDArray[np.float64]:
         """(2, 3): the least and greatest coordinates of all objects, world mm."""
-        placed = np.concatenate([o.mesh.positions @ o.matrix[:3, :3].T + o.matrix[:3, 3] for o in self.objects])
-        return np.stack([placed.min(axis=0), placed.max(axis=0)])
+        points = np.concatenate([o.placed for o in self.objects])
+        return np.stack([points.min(axis=0), points.max(axis=0)])
 
     def at(self, time_s: float) -> Scene:
         """The scene as it is at a time in seconds: a still, in which nothing moves or turns."""

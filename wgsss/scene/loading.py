@@ -1,0 +1,59 @@
+"""Scenes by name, from scene files and from mesh files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from wgsss.errors import InputError, unknown
+from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.material import Material
+from wgsss.scene.materialfile import choose_material
+from wgsss.scene.mesh import load_mesh
+from wgsss.scene.scene import Object, Scene
+from wgsss.scene.scenefile import read_scene
+
+
+def load_scene(
+    name_or_path: str | Path,
+    *,
+    material: str | Path | Material | None = None,
+    size_mm: float | None = None,
+    vertices: int | None = None,
+) -> Scene:
+    """A built-in scene by its name, a scene file (.toml), or a mesh file with default lights and a camera to frame it.
+
+    `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. `size_mm`
+    is for a mesh file: the length of its longest side. `vertices` is for a built-in scene: about how many it has.
+    Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
+    """
+    from wgsss.scene.builtin import SCENES
+
+    name, path = str(name_or_path), Path(name_or_path)
+    builtin = name in SCENES
+    if not builtin and not path.suffix and len(path.parts) == 1:
+        raise unknown("scene", name, SCENES)
+    is_mesh = not builtin and path.suffix.lower() != ".toml"
+    if size_mm is not None and not is_mesh:
+        raise InputError(f"{name}: size_mm is for mesh files; this scene says how large it is")
+    if vertices is not None and not builtin:
+        raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
+
+    chosen = None if material is None else choose_material(material, Path())
+    if is_mesh:
+        loaded = load_mesh(path, size_mm=size_mm)
+        chosen = chosen or choose_material(DEFAULT_MATERIAL, Path())
+        thing = Object(loaded.mesh, chosen.on(loaded.maps))
+        return Scene(path.stem, (thing,), DEFAULT_LIGHTS, framing([thing]))
+    scene: Scene = SCENES[name](vertices) if builtin else read_scene(path)
+    if chosen is None:
+        return scene
+    return replace(scene, objects=tuple(replace(o, material=chosen.on(o.material.maps)) for o in scene.objects))
+
+
+def load_material(name_or_path: str | Path) -> Material:
+    """A measured material by its name, or the one of a material file (.toml), which holds what [object.material] would.
+
+    Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
+    """
+    return choose_material(name_or_path, Path()).material

@@ -1,0 +1,84 @@
+"""Materials by name, from TOML tables and from material files, and the textures they bring or take over from a mesh."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from wgsss.errors import InputError
+from wgsss.optics import SumOfGaussians
+from wgsss.scene import tables
+from wgsss.scene.images import read_map
+from wgsss.scene.material import MATERIALS, Maps, Material, material
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A material that somebody asked for."""
+
+    material: Material
+    coloured: bool
+    """whether its base colour was asked for too, and does not merely come with a measured material"""
+
+    def on(self, maps: Maps) -> Material:
+        """The material on a mesh with these textures, which serve where it has none of its own.
+
+        A base colour texture is the colour: it takes the place of a constant one, unless that was asked for to tint it.
+        """
+        own = self.material.maps
+        both = Maps(**{f.name: _first(getattr(own, f.name), getattr(maps, f.name)) for f in fields(Maps)})
+        keep = self.coloured or both.base_color is None
+        return replace(self.material, maps=both, base_color=self.material.base_color if keep else (1.0, 1.0, 1.0))
+
+
+def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
+    """A material from its name, from a file relative to `folder`, from a table of a TOML file, or from itself."""
+    if isinstance(value, Material):
+        return Chosen(value, coloured=value not in MATERIALS.values())
+    if isinstance(value, dict):
+        return _from_table(value, folder, where, "custom")
+    if not isinstance(value, str | Path):
+        raise InputError(f"material must be a name, a file or a table, not {value!r}")
+    if not Path(value).suffix and os.sep not in str(value):
+        return Chosen(material(str(value)), coloured=False)
+    path = folder / Path(value).expanduser()
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a material file must end in .toml")
+    return _from_table(tables.read_toml(path), path.parent, str(path), path.stem)
+
+
+def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Chosen:
+    parameters = {key: p for key, p in inspect.signature(Material).parameters.items() if key != "maps"}
+    slots = {f"{f.name}_map": f.name for f in fields(Maps)}
+    tables.check_keys(table, [*parameters, *slots, "preset"], where)
+
+    values: tables.Table = {"name": name}
+    if "preset" in table:
+        try:
+            preset = material(str(table["preset"]))
+        except InputError as error:
+            raise tables.at(f"{where}: preset", error) from None
+        values = {key: getattr(preset, key) for key in parameters}
+        if "gaussians" in table:
+            values["sigma_a"] = values["sigma_s_prime"] = None
+        elif "sigma_a" in table or "sigma_s_prime" in table:
+            values["gaussians"] = None
+    values |= {key: value for key, value in table.items() if key in parameters}
+    if isinstance(values.get("gaussians"), dict):
+        values["gaussians"] = tables.call(SumOfGaussians, values["gaussians"], f"{where}: gaussians")
+
+    images = {}
+    for key in slots.keys() & table.keys():
+        path = tables.file_in(table, key, where, folder)
+        images[slots[key]] = tables.call(
+            read_map, {"path": path, "mode": "L" if key == "specular_map" else "RGB"}, f"{where}: {key}"
+        )
+    chosen = Chosen(tables.call(Material, values, where), coloured="base_color" in table)
+    return replace(chosen, material=chosen.on(Maps(**images)))
+
+
+def _first(*values: Any) -> Any:
+    return next((value for value in values if value is not None), None)

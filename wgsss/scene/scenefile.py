@@ -1,0 +1,109 @@
+"""Scene files: the dataclasses of this package as TOML.
+
+The top level holds `name`, `exposure` and `tone_map`. `[camera]`, each `[[light]]` and each `[[object]]` hold the
+fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and `elevation`
+of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm`) or a `shape` (with the arguments of that
+function in `shapes`), and a `material`: a name, a material file, or a table `[object.material]`. Such a table or file
+holds the fields of Material, may start from a `preset`, and names images as `base_color_map`, `normal_map` and
+`specular_map`. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
+"""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+from wgsss.errors import InputError
+from wgsss.scene import tables
+from wgsss.scene.camera import OrthographicCamera, PerspectiveCamera
+from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
+from wgsss.scene.material import Maps
+from wgsss.scene.materialfile import choose_material
+from wgsss.scene.mesh import load_mesh
+from wgsss.scene.scene import Object, Scene
+from wgsss.scene.tables import Table
+
+CAMERAS = {"perspective": PerspectiveCamera, "orthographic": OrthographicCamera}
+LIGHTS = {
+    "directional": DirectionalLight,
+    "point": PointLight,
+    "rect": RectLight,
+    "sphere": SphereLight,
+    "environment": EnvironmentLight,
+}
+
+
+def read_scene(path: Path) -> Scene:
+    """The scene of a file. Raises InputError naming the file, the table and the key that is wrong."""
+    table, folder, where = tables.read_toml(path), path.parent, str(path)
+    parts = {"objects": "object", "lights": "light", "camera": "camera"}
+    simple = [key for key in inspect.signature(Scene).parameters if key not in parts]
+    tables.check_keys(table, [*simple, *parts.values()], where)
+
+    objects = tuple(_object(t, place, folder) for t, place in tables.each(table, "object", where))
+    if not objects:
+        raise InputError(f"{where}: there is no [[object]] to render")
+    lights = tuple(_light(t, place, folder) for t, place in tables.each(table, "light", where))
+    camera = _camera(table["camera"], f"{where}: [camera]") if "camera" in table else framing(objects)
+    values = {"name": path.stem, **{key: table[key] for key in simple if key in table}}
+    scene: Scene = tables.call(
+        Scene, {**values, "objects": objects, "lights": lights or DEFAULT_LIGHTS, "camera": camera}, where
+    )
+    return scene
+
+
+def _object(table: Table, where: str, folder: Path) -> Object:
+    if ("mesh" in table) == ("shape" in table):
+        raise InputError(f"{where}: give either mesh, a file, or shape, a name")
+    source = load_mesh if "mesh" in table else tables.choose(_shapes(), table["shape"], "shape", where)
+    options = [key for key in inspect.signature(source).parameters if key != "path"]
+    own = [key for key in inspect.signature(Object).parameters if key != "mesh"]
+    tables.check_keys(table, ["mesh", "shape", *own, *options], where)
+
+    arguments, maps = {key: table[key] for key in options if key in table}, Maps()
+    if "mesh" in table:
+        arguments["path"] = tables.file_in(table, "mesh", where, folder)
+    mesh = tables.call(source, arguments, where)
+    if "mesh" in table:
+        mesh, maps = mesh.mesh, mesh.maps
+
+    values = {key: table[key] for key in own if key in table}
+    try:
+        chosen = choose_material(table.get("material", DEFAULT_MATERIAL), folder, f"{where}: [object.material]")
+    except InputError as error:
+        raise tables.at(where, error) from None
+    values["material"] = chosen.on(maps)
+    if "motion" in table:
+        values["motion"] = tables.call_kind(table["motion"], _motions(), f"{where}: [object.motion]")
+    thing: Object = tables.call(Object, {"mesh": mesh, **values}, where)
+    return thing
+
+
+def _shapes() -> dict[str, Any]:
+    from wgsss.scene import shapes
+
+    return {name: f for name, f in vars(shapes).items() if inspect.isfunction(f) and not name.startswith("_")}
+
+
+def _motions() -> dict[str, Any]:
+    from wgsss.scene import motion
+
+    return {name.lower(): c for name, c in vars(motion).items() if is_dataclass(c) and not name.startswith("_")}
+
+
+def _light(table: Table, where: str, folder: Path) -> Any:
+    if "file" in table:
+        table = {**table, "file": str(tables.file_in(table, "file", where, folder))}
+    return tables.call_kind(table, LIGHTS, where)
+
+
+def _camera(table: Any, where: str) -> Any:
+    if not isinstance(table, dict) or "distance" not in table:
+        return tables.call_kind(table, CAMERAS, where)
+    camera = tables.choose(CAMERAS, table.get("kind"), "kind", where)
+    orbit = {key: p for key, p in inspect.signature(camera.orbit).parameters.items() if key != "rest"}
+    own = {key: p for key, p in inspect.signature(camera).parameters.items() if key != "eye"}
+    return tables.call(camera.orbit, {k: v for k, v in table.items() if k != "kind"}, where, {**own, **orbit})
