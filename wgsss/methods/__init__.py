@@ -1,0 +1,46 @@
+"""The methods by name. A new one is a file here, its modules in `wgsl/`, a row below and its goldens."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from wgsss.errors import InputError, unknown
+from wgsss.methods.lambert import Lambert
+from wgsss.methods.method import Diffused, Method
+from wgsss.methods.texture_space import TextureSpace
+
+METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace}
+
+
+def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
+    """The method `name` with its knobs set.
+
+    Raises InputError for a name or knob that is not known, or a value that is not a number of the knob's type and range.
+    """
+    if name not in METHODS:
+        raise unknown("method", name, METHODS)
+    kind = METHODS[name]
+    known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
+    values = {}
+    for knob, value in (knobs or {}).items():
+        if knob not in known:
+            raise unknown(f"knob of {name}", knob, known)
+        values[knob] = _parsed(f"{name}: {knob}", known[knob], value)
+    return kind(**values)
+
+
+def _parsed(where: str, knob: Any, value: Any) -> Any:
+    """A knob's value, in the type of its default and within its range."""
+    kind = type(knob.default)
+    try:
+        parsed = kind(float(value)) if kind is int and float(value).is_integer() else kind(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{where} must be {'a whole number' if kind is int else 'a number'}, not '{value}'") from None
+    low, high = knob.metadata["range"]
+    if not low <= parsed <= high:
+        raise InputError(f"{where} must lie between {low:g} and {high:g}, not {parsed:g}")
+    return parsed
+
+
+__all__ = ["METHODS", "Diffused", "Method", "make_method"]

@@ -1,0 +1,47 @@
+// Radiance towards the viewer (Maisch & Ropinski 2017, eq. 5): rho_dt(x_o, w_o) / pi (M_front + M_back) + specular.
+
+import package::units::{PI};
+import package::mesh::{Surface};
+import package::rho_dt::{rho_dt};
+import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    clip_to_world: mat4x4f,
+    eye: vec4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var normal: texture_2d<f32>;
+@group(0) @binding(4) var depth: texture_depth_2d;
+@group(0) @binding(5) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(6) var M_front: texture_2d<f32>;
+@group(0) @binding(7) var M_back: texture_2d<f32>;
+@group(0) @binding(8) var specular: texture_2d<f32>;
+
+struct Pixel {
+    @location(0) radiance: RGBA32Float, // alpha: coverage
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return screen_corner(i);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
+    }
+    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let n_specular = textureLoad(normal, texel, 0);
+    let cosine = max(dot(normalize(n_specular.xyz), direction_to_eye(params.eye, x)), 0.0);
+    // A slot that a method leaves empty is a single black texel, loaded at its one place.
+    let back = textureLoad(M_back, min(texel, textureDimensions(M_back) - 1u), 0).rgb;
+    let M = textureLoad(M_front, texel, 0).rgb + back;
+    let diffuse = M * (rho_dt(rho_dt_table, cosine, n_specular.w) / PI);
+    return Pixel(vec4f(diffuse + textureLoad(specular, texel, 0).rgb, 1.0));
+}

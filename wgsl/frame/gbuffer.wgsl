@@ -1,0 +1,52 @@
+// What is seen at each pixel: which object, where in its atlas, its normal, base colour and specular scale.
+
+import package::mesh::{Vertex, Surface, bent_normal};
+import package::targets::{RGBA32Float, RGBA16Float, RGBA8UnormSrgb};
+
+struct Params {
+    world_to_clip: mat4x4f,
+    eye: vec4f, // xyz, 1: where the camera is; xyz, 0: the direction towards it
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var base_color_map: texture_2d<f32>;
+@group(0) @binding(4) var normal_map: texture_2d<f32>;
+@group(0) @binding(5) var specular_map: texture_2d<f32>;
+@group(0) @binding(6) var linear_repeat: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) atlas: vec2f,
+}
+
+struct GBuffer {
+    @location(0) where_seen: RGBA32Float, // atlas u, v; object id; 1
+    @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
+    @location(2) base_color: RGBA8UnormSrgb,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas);
+}
+
+@fragment
+fn fs(in: Varying) -> GBuffer {
+    var n = bent_normal(normalize(in.normal), in.position, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
+    let to_eye = params.eye.xyz - in.position * params.eye.w;
+    let facing = cross(dpdx(in.position), dpdy(in.position)); // an open sheet seen from behind shows its back
+    if dot(in.normal, to_eye) < 0.0 && dot(in.normal, facing) * dot(facing, to_eye) < 0.0 {
+        n = -n;
+    }
+    let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
+    let color = surface.base_color * textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    return GBuffer(vec4f(in.atlas, f32(surface.id), 1.0), vec4f(n, specular), vec4f(color, 1.0));
+}

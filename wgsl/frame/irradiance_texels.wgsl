@@ -1,0 +1,68 @@
+// L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
+
+import package::mesh::{Vertex, Surface, bent_normal, color_part};
+import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::irradiance::{transmitted, transmitted_environment};
+import package::targets::{RGBA16Float};
+
+struct Params {
+    lights: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var<storage, read> lights: array<Light>;
+@group(0) @binding(4) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(5) var shadow_maps: texture_depth_2d_array;
+@group(0) @binding(6) var compare_less: sampler_comparison;
+@group(0) @binding(7) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(8) var environment: texture_2d<f32>;
+@group(0) @binding(9) var linear_wrap_u: sampler;
+@group(0) @binding(10) var base_color_map: texture_2d<f32>;
+@group(0) @binding(11) var normal_map: texture_2d<f32>;
+@group(0) @binding(12) var specular_map: texture_2d<f32>;
+@group(0) @binding(13) var linear_repeat: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+}
+
+struct Texel {
+    @location(0) irradiance: RGBA16Float, // L_d times the base colour's share before diffusion; 1 where covered
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    let clip = vec4f(vertex.atlas.x * 2.0 - 1.0, 1.0 - vertex.atlas.y * 2.0, 0.0, 1.0);
+    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v));
+}
+
+@fragment
+fn fs(in: Varying) -> Texel {
+    let x = in.position;
+    let n = bent_normal(normalize(in.normal), x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
+    let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
+    let color = surface.base_color * textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    var irradiance = transmitted_environment(environment, linear_wrap_u, n);
+    for (var i = 0u; i < params.lights; i++) {
+        let light = lights[i];
+        let at = incident(light, x);
+        if dot(n, at.direction) <= 0.0 {
+            continue;
+        }
+        var lit = 1.0;
+        if light.views > 0u {
+            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            lit = shadow(views[layer], layer, at, x, n, shadow_maps, compare_less);
+        }
+        irradiance += transmitted(at, n, specular, lit, rho_dt_table);
+    }
+    return Texel(vec4f(irradiance * color_part(color, 1.0 - surface.color_after), 1.0));
+}

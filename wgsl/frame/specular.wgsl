@@ -1,0 +1,70 @@
+// Light reflected at the surface of one object: the GGX lobe of each light, and the prefiltered environment.
+
+import package::units::{Number};
+import package::mesh::{Surface};
+import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::ggx::{ggx_brdf};
+import package::rho_dt::{rho_dt};
+import package::sampling::{lat_long_of_direction};
+import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    clip_to_world: mat4x4f,
+    eye: vec4f,
+    alpha: Number,
+    eta: Number,
+    lights: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var normal: texture_2d<f32>;
+@group(0) @binding(4) var depth: texture_depth_2d;
+@group(0) @binding(5) var<storage, read> lights: array<Light>;
+@group(0) @binding(6) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(7) var shadow_maps: texture_depth_2d_array;
+@group(0) @binding(8) var compare_less: sampler_comparison;
+@group(0) @binding(9) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(10) var reflection: texture_2d<f32>;
+@group(0) @binding(11) var linear_wrap_u: sampler;
+
+struct Pixel {
+    @location(0) specular: RGBA32Float, // radiance
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return screen_corner(i);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
+    }
+    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let n_specular = textureLoad(normal, texel, 0);
+    let n = normalize(n_specular.xyz);
+    let w_o = direction_to_eye(params.eye, x);
+    // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance.
+    let mirrored = textureSampleLevel(reflection, linear_wrap_u, lat_long_of_direction(reflect(-w_o, n)), 0.0).rgb;
+    var total = mirrored * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
+    for (var i = 0u; i < params.lights; i++) {
+        let light = lights[i];
+        let at = incident(light, x);
+        let f_r = ggx_brdf(n, at.direction, w_o, params.alpha, params.eta);
+        if f_r <= 0.0 {
+            continue;
+        }
+        var lit = 1.0;
+        if light.views > 0u {
+            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            lit = shadow(views[layer], layer, at, x, n, shadow_maps, compare_less);
+        }
+        total += at.irradiance * (f_r * dot(n, at.direction) * lit);
+    }
+    return Pixel(vec4f(total * n_specular.w, 1.0));
+}

@@ -1,0 +1,34 @@
+// M where light leaves at the point that it entered: the profile's total times L_d.
+
+import package::mesh::{Surface, color_part};
+import package::screen::{screen_corner};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    total: vec3f, // of the diffusion profile
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var base_color: texture_2d<f32>;
+@group(0) @binding(4) var irradiance: texture_2d<f32>;
+
+struct Pixel {
+    @location(0) M_front: RGBA32Float,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return screen_corner(i);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
+    }
+    let color = textureLoad(base_color, texel, 0).rgb;
+    return Pixel(vec4f(params.total * color * textureLoad(irradiance, texel, 0).rgb, 1.0));
+}

@@ -1,0 +1,40 @@
+// Meshes as the shaders see them, and the maps that vary a material over a surface.
+
+import package::units::{Number, Position, Direction};
+
+struct Vertex {
+    position: vec3f, // mm, object space
+    u: Number,       // the mesh's own texture coordinates, for its maps
+    normal: vec3f,
+    v: Number,
+    atlas: vec2f,    // unique texture coordinates, for texture-space passes
+    welded: u32,     // the vertex of the welded topology
+}
+
+// What is the same over an object in all passes of a frame.
+struct Surface {
+    object_to_world: mat4x4f, // rigid
+    base_color: vec3f,        // linear; multiplies the map
+    color_after: Number,      // share of the base colour applied after diffusion (Mikkelsen 2009, 3.5)
+    specular: Number,         // scale of the specular lobe; multiplies the map
+    id: u32,                  // 1 and up; 0 is the background
+}
+
+// The normal bent by a tangent-space normal map, without stored tangents: the frame follows from the derivatives of
+// position and texture coordinates (Mikkelsen 2010). `texel` is the map's sample in 0..1. Fragment stage only.
+fn bent_normal(n: Direction, x: Position, uv: vec2f, texel: vec3f) -> Direction {
+    let dx = dpdx(x);
+    let dy = dpdy(x);
+    let duvdx = dpdx(uv);
+    let duvdy = dpdy(uv);
+    let t_u = cross(dy, n) * duvdx.x + cross(n, dx) * duvdy.x;
+    let t_v = cross(dy, n) * duvdx.y + cross(n, dx) * duvdy.y;
+    let scale = inverseSqrt(max(max(dot(t_u, t_u), dot(t_v, t_v)), 1e-30));
+    let m = texel * 2.0 - 1.0; // green points up, v down
+    return normalize(t_u * (scale * m.x) - t_v * (scale * m.y) + n * max(m.z, 1e-3));
+}
+
+// Base colour split into the parts before and after diffusion: col(x_i)^(1-a) and col(x_o)^a (Mikkelsen 2009, 3.5).
+fn color_part(color: vec3f, share: Number) -> vec3f {
+    return pow(max(color, vec3f(1e-6)), vec3f(share));
+}

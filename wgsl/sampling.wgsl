@@ -1,0 +1,28 @@
+// Point sets and maps of directions.
+
+import package::units::{Number, Direction, PI};
+
+// Point i of n of the Hammersley set in the unit square.
+fn hammersley(i: u32, n: u32) -> vec2f {
+    return vec2f((f32(i) + 0.5) / f32(n), f32(reverseBits(i)) * 2.3283064365386963e-10); // 2^-32
+}
+
+// The direction of a point of a latitude-longitude map: v = 0 is +y, u = 1/2 is -z, u grows towards +x.
+fn direction_of_lat_long(uv: vec2f) -> Direction {
+    let theta = PI * uv.y;
+    let phi = 2.0 * PI * (uv.x - 0.5);
+    return vec3f(sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi));
+}
+
+// The inverse of direction_of_lat_long.
+fn lat_long_of_direction(d: Direction) -> vec2f {
+    return vec2f(0.5 + atan2(d.x, -d.z) / (2.0 * PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
+}
+
+// A frame whose last column is n (Duff et al. 2017).
+fn frame_about(n: Direction) -> mat3x3f {
+    let s = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (s + n.z);
+    let b = n.x * n.y * a;
+    return mat3x3f(vec3f(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3f(b, s + n.y * n.y * a, -n.y), n);
+}

@@ -1,0 +1,48 @@
+// M_front of one object at its pixels: its irradiance maps, each blurred by one Gaussian, summed by weight
+// (Mikkelsen 2009, 3.4, step 4a).
+
+import package::mesh::{Surface, color_part};
+import package::screen::{screen_corner};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    weights: array<vec4f, 6>, // rgb of each Gaussian, narrowest first
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var base_color: texture_2d<f32>;
+@group(0) @binding(4) var linear_clamp: sampler;
+@group(0) @binding(5) var blurred_0: texture_2d<f32>;
+@group(0) @binding(6) var blurred_1: texture_2d<f32>;
+@group(0) @binding(7) var blurred_2: texture_2d<f32>;
+@group(0) @binding(8) var blurred_3: texture_2d<f32>;
+@group(0) @binding(9) var blurred_4: texture_2d<f32>;
+@group(0) @binding(10) var blurred_5: texture_2d<f32>;
+
+struct Pixel {
+    @location(0) M_front: RGBA32Float,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return screen_corner(i);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    let seen = textureLoad(where_seen, texel, 0);
+    if u32(seen.z) != surface.id {
+        discard;
+    }
+    let uv = seen.xy;
+    var M = params.weights[0].rgb * textureSampleLevel(blurred_0, linear_clamp, uv, 0.0).rgb;
+    M += params.weights[1].rgb * textureSampleLevel(blurred_1, linear_clamp, uv, 0.0).rgb;
+    M += params.weights[2].rgb * textureSampleLevel(blurred_2, linear_clamp, uv, 0.0).rgb;
+    M += params.weights[3].rgb * textureSampleLevel(blurred_3, linear_clamp, uv, 0.0).rgb;
+    M += params.weights[4].rgb * textureSampleLevel(blurred_4, linear_clamp, uv, 0.0).rgb;
+    M += params.weights[5].rgb * textureSampleLevel(blurred_5, linear_clamp, uv, 0.0).rgb;
+    return Pixel(vec4f(M * color_part(textureLoad(base_color, texel, 0).rgb, surface.color_after), 1.0));
+}

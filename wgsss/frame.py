@@ -1,0 +1,181 @@
+"""The passes that all methods share, as functions of the graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.environment import rho_dt_table
+from wgsss.emitters import emitters
+from wgsss.gpu import TextureKey
+from wgsss.graph import Graph, Handle
+from wgsss.scene import OrthographicCamera, Scene
+from wgsss.scene.scene import TONE_MAPS
+from wgsss.stage import Body, Stage
+
+Matrix = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class View:
+    """The camera as the shaders see it. `eye`: xyz, 1 the camera's position; xyz, 0 the direction towards it."""
+
+    world_to_clip: Matrix
+    clip_to_world: Matrix
+    eye: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What methods draw from: the stage, the view, the g-buffer and the lights.
+
+    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps, and `count` of lights.
+    """
+
+    graph: Graph
+    stage: Stage
+    size: tuple[int, int]
+    view: View
+    gbuffer: SimpleNamespace
+    lighting: SimpleNamespace
+    rho_dt: dict[tuple[float, float], Handle]
+
+    def rho_dt_table(self, body: Body) -> Handle:
+        """The table of rho_dt for a body's surface."""
+        return self.rho_dt[body.material.roughness, body.material.eta]
+
+    def light_bindings(self, body: Body) -> dict[str, Any]:
+        """What every module that gathers L_d binds."""
+        lighting = self.lighting
+        return {
+            "surface": body.surface,
+            "lights": lighting.lights,
+            "views": lighting.views,
+            "shadow_maps": lighting.shadow_maps,
+            "rho_dt_table": self.rho_dt_table(body),
+        }
+
+    def seen(self, *names: str) -> dict[str, Handle]:
+        """Parts of the g-buffer by binding name."""
+        return {name: getattr(self.gbuffer, name) for name in names}
+
+
+def begin(graph: Graph, stage: Stage, size: tuple[int, int]) -> Frame:
+    """Declare g-buffer, shadows and tables of a frame of `size` (width, height) pixels."""
+    view = _view(stage.scene, size)
+    gbuffer = _gbuffer(graph, stage, size, view)
+    tables = {}
+    for body in stage.bodies:
+        key = (body.material.roughness, body.material.eta)
+        if key not in tables:
+            tables[key] = rho_dt_table(graph, body.material)
+    return Frame(graph, stage, size, view, gbuffer, _lighting(graph, stage), tables)
+
+
+def _world_points(scene: Scene) -> npt.NDArray[np.float64]:
+    return np.concatenate([o.mesh.positions @ o.matrix[:3, :3].T + o.matrix[:3, 3] for o in scene.objects])
+
+
+def _view(scene: Scene, size: tuple[int, int]) -> View:
+    camera = scene.camera
+    corners = np.array(np.meshgrid(*scene.bounds.T, indexing="ij")).reshape(3, -1).T
+    to_view = camera.view()
+    depths = -(corners @ to_view[2, :3] + to_view[2, 3])
+    margin = 0.01 * max(float(np.ptp(depths)), 1e-3)
+    near, far = float(depths.min()) - margin, float(depths.max()) + margin
+    orthographic = isinstance(camera, OrthographicCamera)
+    if not orthographic:  # inside or in front of the scene
+        far = max(far, 1e-3)
+        near = max(near, 1e-3 * far)
+    world_to_clip = camera.projection(size[0] / size[1], near, far) @ to_view
+    towards = np.subtract(camera.eye, camera.target)
+    eye = (*(towards / np.linalg.norm(towards)), 0.0) if orthographic else (*camera.eye, 1.0)
+    return View(world_to_clip, np.linalg.inv(world_to_clip), eye)
+
+
+def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> SimpleNamespace:
+    params = {"world_to_clip": view.world_to_clip, "eye": view.eye}
+    drawn: Any = None
+    for body in stage.bodies:
+        kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("where_seen", "normal", "base_color")}
+        drawn = graph.draw("frame/gbuffer", size=size, indices=body.indices, depth="new" if drawn is None else drawn.depth, into=kept,
+                           params=params, surface=body.surface, vertices=body.vertices, **vars(body.maps))  # fmt: skip
+    return drawn
+
+
+def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
+    """Lights and the shadow maps of those that cast shadows."""
+    import wgpu
+
+    found = emitters(stage.scene.lights, _world_points(stage.scene))
+    side = found.shadow_size
+    if found.views:
+        maps: Any = graph.texture("shadow_maps", (side, side, len(found.views)), "depth32float")
+        for layer, shadow_view in enumerate(found.views):
+            for body in stage.bodies:
+                to_clip = shadow_view["world_to_clip"] @ body.rest.matrix
+                maps = graph.draw("frame/shadow", size=(side, side), indices=body.indices, depth=maps, layer=layer,
+                                  params={"object_to_clip": to_clip}, vertices=body.vertices, label=str(layer))  # fmt: skip
+    else:
+        key = TextureKey((1, 1, 1), "depth32float", wgpu.TextureUsage.TEXTURE_BINDING)
+        maps = stage.shared(key, lambda: stage.gpu.acquire(key))
+    return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps, count=len(found.lights))
+
+
+def irradiance_pixels(frame: Frame) -> Handle:
+    """L_d, W/m^2, at each pixel."""
+    irradiance: Any = None
+    for body in frame.stage.bodies:
+        params = {"clip_to_world": frame.view.clip_to_world, "lights": frame.lighting.count}
+        irradiance = frame.graph.draw("frame/irradiance_pixels", into=irradiance, size=frame.size, params=params,
+                                      environment=body.environment.irradiance, **frame.seen("where_seen", "normal", "depth"),
+                                      **frame.light_bindings(body))  # fmt: skip
+    return irradiance
+
+
+def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
+    """L_d, W/m^2, over a body's atlas, times the share of its base colour that is applied before diffusion."""
+    return frame.graph.draw("frame/irradiance_texels", size=(map_size, map_size), indices=body.indices,
+                            params={"lights": frame.lighting.count}, vertices=body.vertices, environment=body.environment.irradiance,
+                            **vars(body.maps), **frame.light_bindings(body))  # fmt: skip
+
+
+def irradiance_vertices(frame: Frame, body: Body) -> Handle:
+    """L_d, W/m^2, at a body's render vertices: a buffer of vec4f."""
+    count = len(body.layout.vertex)
+    return frame.graph.dispatch("frame/irradiance_vertices", size=count, params={"lights": frame.lighting.count, "vertices": count},
+                                vertices=body.vertices, environment=body.environment.irradiance, **frame.light_bindings(body))  # fmt: skip
+
+
+def specular(frame: Frame) -> Handle:
+    """Radiance reflected at the surface, W/(m^2 sr)."""
+    reflected: Any = None
+    for body in frame.stage.bodies:
+        params = {"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye, "alpha": body.material.roughness**2,
+                  "eta": body.material.eta, "lights": frame.lighting.count}  # fmt: skip
+        reflected = frame.graph.draw("frame/specular", into=reflected, size=frame.size, params=params,
+                                     reflection=body.environment.reflection, **frame.seen("where_seen", "normal", "depth"),
+                                     **frame.light_bindings(body))  # fmt: skip
+    return reflected
+
+
+def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: Handle) -> Handle:
+    """Radiance towards the viewer with coverage in alpha (Maisch & Ropinski 2017, eq. 5)."""
+    nothing = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
+    radiance: Any = None
+    for body in frame.stage.bodies:
+        radiance = frame.graph.draw("frame/composite", into=radiance, size=frame.size, surface=body.surface,
+                                    params={"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye},
+                                    rho_dt_table=frame.rho_dt_table(body), M_front=M_front, M_back=M_back or nothing, specular=reflected,
+                                    **frame.seen("where_seen", "normal", "depth"))  # fmt: skip
+    return radiance
+
+
+def tone_map(graph: Graph, radiance: Handle, exposure: float, curve: str) -> Handle:
+    """The image for a display, sRGB in 8 bits. `exposure` in stops; `curve` is one of TONE_MAPS."""
+    params = {"scale": 2.0**exposure, "curve": TONE_MAPS.index(curve)}
+    return graph.draw("frame/tone_map", params=params, radiance=radiance)

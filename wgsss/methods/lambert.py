@@ -1,0 +1,30 @@
+"""Lambert: light leaves where it entered. What every diffusion profile tends to as its width goes to zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from wgsss import frame as shared
+from wgsss.frame import Frame
+from wgsss.methods.method import Diffused
+from wgsss.stage import Stage
+
+
+@dataclass(frozen=True)
+class Lambert:
+    """M_front = R_d L_d, R_d being the profile's total reflectance; M_back is part of it."""
+
+    source: ClassVar[str] = "the limit of a profile without width"
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = ({},)
+
+    def bake(self, stage: Stage) -> None:
+        """Nothing."""
+
+    def passes(self, frame: Frame) -> Diffused:
+        irradiance = shared.irradiance_pixels(frame)
+        M_front: Any = None
+        for body in frame.stage.bodies:
+            M_front = frame.graph.draw("lambert/reflect", into=M_front, size=frame.size, params={"total": body.material.profile.total},
+                                       surface=body.surface, irradiance=irradiance, **frame.seen("where_seen", "base_color"))  # fmt: skip
+        return Diffused(M_front, irradiance=irradiance)

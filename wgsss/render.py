@@ -1,0 +1,134 @@
+"""From a scene and a method to an image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss import frame as shared
+from wgsss.errors import InputError, unknown
+from wgsss.gpu import LIMITS, Gpu, default_gpu
+from wgsss.graph import Graph, Handle
+from wgsss.methods import Method, make_method
+from wgsss.scene import Scene
+from wgsss.stage import Stage
+
+Array = npt.NDArray[Any]
+
+AOVS = ("irradiance", "M_front", "M_back", "specular", "depth", "normal")
+DEFAULT_METHOD = "deon07"
+
+
+class RenderError(RuntimeError):
+    """A fault of the renderer or the driver, not of the input: its message is one line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A rendered frame.
+
+    Attributes:
+        pixels: float32 (H, W, 4), linear RGB radiance, W/(m^2 sr), and coverage.
+        display: uint8 (H, W, 4), exposed, tone mapped and sRGB-encoded, with coverage in alpha.
+        aovs: float32 (H, W, 3) or, for depth, (H, W, 1), by name: `irradiance` (L_d), `M_front` and `M_back` in W/m^2,
+            `specular` in W/(m^2 sr), `depth` (distance along the viewing direction, mm; inf where nothing is seen) and
+            `normal` (world space).
+        timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run on a device includes its compilation.
+        graph: the frame's graph, for `str` and `dot`.
+        metadata: what made the image: method, knobs, adapter, version.
+    """
+
+    pixels: Array
+    display: Array
+    aovs: dict[str, Array]
+    timings: dict[str, float]
+    clock: str
+    graph: Graph = field(repr=False)
+    metadata: dict[str, str] = field(default_factory=dict)
+
+
+class Renderer:
+    """One scene, method and size, from frame to frame.
+
+    Raises InputError for a size that the device cannot draw. Baking happens here, and may take a while the first time.
+    """
+
+    def __init__(self, scene: Scene, method: Method, size: tuple[int, int], gpu: Gpu | None = None) -> None:
+        largest = LIMITS["max-texture-dimension-2d"]
+        if not all(isinstance(n, int) and 1 <= n <= largest for n in size):
+            raise InputError(f"the image size must be 1 to {largest} pixels a side, not {size[0]} x {size[1]}")
+        self.gpu = gpu or default_gpu()
+        self.method, self.size = method, size
+        self.stage = Stage(self.gpu, scene)
+        method.bake(self.stage)
+
+    def frame(self, time_s: float = 0.0, aovs: Sequence[str] = (), timed: bool = True) -> Image:
+        """The image at a time in seconds, with the named extra outputs (AOVS).
+
+        Raises RenderError where a pixel is not finite.
+        """
+        for name in aovs:
+            if name not in AOVS:
+                raise unknown("aov", name, AOVS)
+        if time_s != self.stage.time_s:
+            self.stage.pose(time_s)
+        graph = Graph(self.gpu)
+        frame = shared.begin(graph, self.stage, self.size)
+        diffused = self.method.passes(frame)
+        reflected = shared.specular(frame)
+        radiance = shared.composite(frame, diffused.M_front, diffused.M_back, reflected)
+        scene = self.stage.scene
+        display = shared.tone_map(graph, radiance, scene.exposure, scene.tone_map)
+        handles: dict[str, Handle | None] = {
+            "irradiance": diffused.irradiance or shared.irradiance_pixels(frame),
+            "M_front": diffused.M_front,
+            "M_back": diffused.M_back,
+            "specular": reflected,
+            "depth": frame.gbuffer.depth,
+            "normal": frame.gbuffer.normal,
+        }
+        wanted = {name: handles[name] for name in aovs}
+        graph.run(radiance, display, *(h for h in wanted.values() if h is not None), timed=timed)
+        pixels = graph.read(radiance)
+        found = {name: self._aov(graph, frame, name, handle) for name, handle in wanted.items()}
+        for name, values in (("radiance", pixels), *found.items()):
+            bad = ~np.isfinite(values).all(axis=2) & (pixels[..., 3] > 0)
+            if bad.any():
+                y, x = np.argwhere(bad)[0]
+                raise RenderError(f"{int(bad.sum())} pixels of {name} are not finite, the first at x {x}, y {y}")
+        return Image(pixels, graph.read(display), found, graph.times, graph.clock, graph)
+
+    def _aov(self, graph: Graph, frame: shared.Frame, name: str, handle: Handle | None) -> Array:
+        width, height = self.size
+        if handle is None:
+            return np.zeros((height, width, 3), np.float32)
+        texels = graph.read(handle).astype(np.float32)
+        if name != "depth":
+            return texels[..., :3]
+        # Clip depth is affine in 1/distance or in distance; the inverse of the projection's lower right corner undoes it.
+        projection = frame.view.world_to_clip @ np.linalg.inv(self.stage.scene.camera.view())
+        (a, b), (c, d) = projection[2:, 2:]
+        with np.errstate(divide="ignore"):
+            distance = -((b - texels * d) / (texels * c - a))
+        return np.where(texels < 1.0, distance, np.inf).astype(np.float32)
+
+
+def render(
+    scene: Scene,
+    method: str = DEFAULT_METHOD,
+    size: tuple[int, int] = (512, 512),
+    *,
+    time: float = 0.0,
+    aovs: Sequence[str] = (),
+    **knobs: Any,
+) -> Image:
+    """Render `scene` by a named method at `size` (width, height) pixels, `time` seconds into its motion.
+
+    `aovs` names extra outputs (see AOVS); `knobs` are the method's (see `wgsss methods`). Raises InputError for names
+    and values that do not fit.
+    """
+    return Renderer(scene, make_method(method, knobs), size).frame(time, aovs)

@@ -1,0 +1,154 @@
+"""A scene as it stands on the GPU: what persists from frame to frame, uploaded when first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from wgsss import wgsl
+from wgsss.bake.environment import Prefiltered, prefilter
+from wgsss.bake.unwrap import Surface, split, unwrap
+from wgsss.gpu import Gpu
+from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
+
+
+class Stage:
+    """The scene `scene` on the device `gpu`, posed at a time.
+
+    Attributes:
+        scene: the scene as posed: nothing in it moves.
+        bodies: its objects.
+    """
+
+    def __init__(self, gpu: Gpu, scene: Scene, time_s: float = 0.0) -> None:
+        self.gpu = gpu
+        self.rest = scene
+        self.time_s = time_s
+        self.scene = scene.at(time_s)
+        self._shared: dict[Any, Any] = {}
+        self.bodies = [Body(self, i) for i in range(len(scene.objects))]
+
+    def pose(self, time_s: float) -> None:
+        """Move to another time: only what moves is uploaded anew."""
+        self.time_s = time_s
+        self.scene = self.rest.at(time_s)
+
+    def shared(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What several bodies or frames use, made once."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
+
+    def image(self, pixels: np.ndarray, texture_format: str) -> Any:
+        """A material's texture. Colours without alpha get one."""
+
+        def make() -> Any:
+            opaque = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+            if pixels.ndim == 3:
+                opaque[..., :3] = pixels
+            return self.gpu.texture(opaque if pixels.ndim == 3 else pixels, texture_format)
+
+        return self.shared(("image", id(pixels), texture_format), make)
+
+    def environments(self) -> list[EnvironmentLight]:
+        """The environments that light the scene."""
+        return [light for light in self.scene.lights if isinstance(light, EnvironmentLight)]
+
+
+class Body:
+    """One object of a stage, with its buffers and textures."""
+
+    def __init__(self, stage: Stage, index: int) -> None:
+        self.stage = stage
+        self.index = index
+        self._unwrapped = False
+        self._posed: tuple[float, Any] | None = None
+
+    @property
+    def rest(self) -> Object:
+        """The object as it is before any motion."""
+        return self.stage.rest.objects[self.index]
+
+    @property
+    def material(self) -> Material:
+        return self.rest.material
+
+    def unwrap(self) -> Surface:
+        """Give the body an atlas, which texture-space passes need. The first time takes a while."""
+        self._unwrapped = True
+        return self.layout
+
+    @property
+    def layout(self) -> Surface:
+        """The render mesh: with an atlas where one was asked for."""
+        mesh, gpu = self.rest.mesh, self.stage.gpu
+        if self._unwrapped:
+            return self.stage.shared(("unwrap", id(mesh)), lambda: unwrap(gpu, mesh))
+        return self.stage.shared(("split", id(mesh)), lambda: split(mesh))
+
+    @property
+    def vertices(self) -> Any:
+        """A buffer of array<Vertex> (wgsl/mesh.wgsl), as posed."""
+        if self.rest.motion is None:
+            key = ("vertices", id(self.rest.mesh), self._unwrapped)
+            return self.stage.shared(key, lambda: self._upload(self.rest.mesh))
+        if self._posed is None or self._posed[0] != self.stage.time_s:
+            self._posed = (self.stage.time_s, self._upload(self.stage.scene.objects[self.index].mesh))
+        return self._posed[1]
+
+    def _upload(self, mesh: Mesh) -> Any:
+        layout = self.layout
+        normals = layout.normals if mesh is self.rest.mesh else mesh.normals[layout.vertex]
+        value = {
+            "position": mesh.positions[layout.vertex],
+            "u": layout.uvs[:, 0],
+            "normal": normals,
+            "v": layout.uvs[:, 1],
+            "atlas": layout.atlas,
+            "welded": layout.vertex,
+        }
+        return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
+
+    @property
+    def indices(self) -> Any:
+        """The index buffer, u32."""
+        key = ("indices", id(self.rest.mesh), self._unwrapped)
+        return self.stage.shared(key, lambda: self.stage.gpu.buffer(self.layout.faces.astype(np.uint32)))
+
+    @property
+    def surface(self) -> dict[str, Any]:
+        """The value of struct Surface (wgsl/mesh.wgsl)."""
+        material = self.material
+        return {
+            "object_to_world": self.rest.matrix,
+            "base_color": material.base_color,
+            "color_after": material.color_after,
+            "specular": material.specular,
+            "id": self.index + 1,
+        }
+
+    @cached_property
+    def maps(self) -> SimpleNamespace:
+        """Textures by binding name; a single neutral texel where the material has none."""
+        image, maps = self.stage.image, self.material.maps
+        return SimpleNamespace(
+            base_color_map=image(_WHITE if maps.base_color is None else maps.base_color, "rgba8unorm-srgb"),
+            normal_map=image(_FLAT if maps.normal is None else maps.normal, "rgba8unorm"),
+            specular_map=image(_FULL if maps.specular is None else maps.specular, "r8unorm"),
+        )
+
+    @cached_property
+    def environment(self) -> Prefiltered:
+        """The scene's environments as this material receives and reflects them."""
+        material = self.material
+        key = ("environment", material.roughness, material.eta, material.specular)
+        return self.stage.shared(key, lambda: prefilter(self.stage.gpu, self.stage.environments(), material))
+
+
+_WHITE = np.full((1, 1, 3), 255, np.uint8)
+_FLAT = np.array([[[128, 128, 255]]], np.uint8)
+_FULL = np.full((1, 1), 255, np.uint8)
