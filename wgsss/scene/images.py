@@ -126,7 +126,7 @@ def _read_hdr(path: Path) -> Array:
 
 
 def _decode_rgbe(data: bytes, height: int, width: int) -> Array:
-    if not (8 <= width < 32768 and data[:2] == b"\2\2" and data[2:4] == width.to_bytes(2, "big")):
+    if not (8 <= width < 32768 and data[:2] == b"\2\2" and data[2:3] < b"\x80"):
         if len(data) < 4 * width * height:
             raise InputError("truncated, or in the old run-length encoding, which is not supported")
         return np.frombuffer(data, np.uint8, 4 * width * height).reshape(height, width, 4)
@@ -134,7 +134,7 @@ def _decode_rgbe(data: bytes, height: int, width: int) -> Array:
     at = 0
     try:
         for row in range(height):
-            if data[at : at + 4] != data[:4]:
+            if data[at : at + 4] != b"\2\2" + width.to_bytes(2, "big"):
                 raise InputError(f"damaged in row {row} of {height}")
             at += 4
             line = bytearray()
