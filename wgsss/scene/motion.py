@@ -1,0 +1,55 @@
+"""Motions: how a body's shape changes over time, as functions of its rest pose."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.scene import checks
+
+
+@dataclass(frozen=True)
+class BendAndSwell:
+    """A body along y that stands on y = 0, sways from side to side and lets a swelling run up along it.
+
+    At time 0, and after every period, it is in its rest pose.
+    """
+
+    length: float = 60.0
+    """height of the body at rest, mm"""
+    bend: float = 75.0
+    """greatest angle between the top and the foot, degrees, towards +x and -x in turn"""
+    swell: float = 0.3
+    """greatest change of the radius, as a share of it"""
+    waves: float = 1.0
+    """swellings along the body at a time"""
+    period_s: float = 4.0
+    """seconds"""
+
+    def __post_init__(self) -> None:
+        checks.number(self, "length", 0, above=True)
+        checks.number(self, "bend", 0, 180)
+        checks.number(self, "swell", 0, 0.9)
+        checks.number(self, "waves", 0)
+        checks.number(self, "period_s", 0, above=True)
+
+    def apply(self, positions: npt.ArrayLike, time_s: float) -> npt.NDArray[np.float32]:
+        """Positions (V,3), mm, at a time in seconds, of positions (V,3) at rest."""
+        rest = np.asarray(positions, dtype=np.float64)
+        phase = 2 * math.pi * ((time_s / self.period_s) % 1.0)
+        x, y, z = rest.T
+        along = 2 * math.pi * self.waves * y / self.length
+        # A travelling wave less its own shape at time 0, so that the rest pose is the one given; at most 2 in size.
+        grown = 1 + 0.5 * self.swell * (np.sin(phase - along) + np.sin(along))
+        x, z = x * grown, z * grown
+
+        # The axis becomes an arc of the same length, each cross-section staying flat and at a right angle to it.
+        curvature = math.radians(self.bend) * math.sin(phase) / self.length
+        angle = curvature * y
+        half = np.sinc(angle / (2 * np.pi))  # sin(angle / 2) / (angle / 2), well behaved where nothing bends
+        across, up = y * half * np.sin(angle / 2), y * half * np.cos(angle / 2)
+        bent = np.stack([across + x * np.cos(angle), up - x * np.sin(angle), z], axis=1)
+        return bent.astype(np.float32)
