@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from wgsss import wgsl
 from wgsss.gpu import Gpu, default_gpu
 
 ROOT = Path(__file__).parents[1]
@@ -31,3 +33,16 @@ def data() -> Path:
     if not DATA.is_dir():
         pytest.skip(f"no real data at {DATA} (set WGSSS_DATA)")
     return DATA
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    """Writes modules of a test's own, name=text, in place of the shaders; gives back their folder."""
+    monkeypatch.setattr(wgsl.load, "__defaults__", (tmp_path,))
+
+    def write(**texts: str) -> Path:
+        for name, text in texts.items():
+            (tmp_path / f"{name}.wgsl").write_text(text)
+        return tmp_path
+
+    return write

@@ -38,12 +38,6 @@ READ_BACK = [  # an expression of vec4f for each field, and what it must be
 ]  # fmt: skip
 
 
-def write(folder, **files):
-    for name, text in files.items():
-        (folder / f"{name}.wgsl").write_text(text)
-    return folder
-
-
 def random_all(rng, pair):
     def number(*shape):
         return rng.uniform(-9, 9, shape).astype(np.float32)
@@ -56,16 +50,20 @@ def random_all(rng, pair):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("space", "pair"), [("uniform", 4), ("storage, read", 2)])  # uniform arrays need a stride of 16
-def test_gpu_reads_each_field_where_it_was_packed(gpu: Gpu, tmp_path, monkeypatch, space, pair):
+@pytest.mark.parametrize(
+    ("space", "pair"), [("uniform", 4), ("storage, read", 2)]
+)  # uniform arrays need a stride of 16
+def test_gpu_reads_each_field_where_it_was_packed(gpu: Gpu, modules, space, pair):
     body = "\n".join(f"    values[{i}] = {expression};" for i, (expression, _) in enumerate(READ_BACK))
-    write(tmp_path, probe=EVERY_FIELD.replace("PAIR", f"vec{pair}f") + f"""
+    modules(
+        probe=EVERY_FIELD.replace("PAIR", f"vec{pair}f")
+        + f"""
 @group(0) @binding(0) var<{space}> all: All;
 @group(0) @binding(1) var<storage, read_write> values: array<vec4f>;
 @compute @workgroup_size(1) fn main() {{
 {body}
-}}""")
-    monkeypatch.setattr(wgsl.load, "__defaults__", (tmp_path,))
+}}"""
+    )
     value = random_all(np.random.default_rng(1), pair)
     graph = Graph(gpu)
     values = graph.dispatch("probe", size=len(READ_BACK), all=value)
@@ -73,9 +71,9 @@ def test_gpu_reads_each_field_where_it_was_packed(gpu: Gpu, tmp_path, monkeypatc
     np.testing.assert_allclose(graph.read(values), [expected(value) for _, expected in READ_BACK], rtol=1e-6)
 
 
-def test_arrays_of_structs_pack_from_dicts_and_structured_arrays(tmp_path):
-    write(tmp_path, m="struct L { p: vec3f, k: f32, q: vec3f } @group(0) @binding(0) var<storage> ls: array<L>;")
-    layout = wgsl.load("m", tmp_path).layout("array<L>")
+def test_arrays_of_structs_pack_from_dicts_and_structured_arrays(modules):
+    modules(m="struct L { p: vec3f, k: f32, q: vec3f } @group(0) @binding(0) var<storage> ls: array<L>;")
+    layout = wgsl.load("m").layout("array<L>")
     columns = dict(p=np.arange(6).reshape(2, 3), k=[7, 8], q=np.ones((2, 3)))
     rows = [dict(p=[0, 1, 2], k=7, q=[1, 1, 1]), dict(p=[3, 4, 5], k=8, q=[1, 1, 1])]
     assert layout.pack(columns) == layout.pack(rows)
@@ -95,39 +93,43 @@ def test_arrays_of_structs_pack_from_dicts_and_structured_arrays(tmp_path):
         (3.0, "expected a dict"),
     ],
 )
-def test_misfits_name_the_field(tmp_path, value, complaint):
-    write(tmp_path, m="struct S { p: vec3f, k: f32 }")
+def test_misfits_name_the_field(modules, value, complaint):
+    modules(m="struct S { p: vec3f, k: f32 }")
     with pytest.raises(WgslError, match=complaint):
-        wgsl.load("m", tmp_path).layout("S").pack(value)
+        wgsl.load("m").layout("S").pack(value)
 
 
-def test_imports_include_a_file_once_and_check_names(tmp_path):
-    write(tmp_path,
+def test_imports_include_a_file_once_and_check_names(modules):
+    modules(
           base="fn one() -> f32 { return 1.0; }",
           left="import package::base::{one};\nfn left() -> f32 { return one(); }",
           top="import package::left::{left};\nimport package::base::one;\nfn top() -> f32 { return left() + one(); }")  # fmt: skip
-    module = wgsl.load("top", tmp_path)
+    module = wgsl.load("top")
     assert module.source.count("fn one") == 1
     assert "import" not in module.source
-    write(tmp_path, wrong="// a comment\nimport package::base::{two};")
+    modules(wrong="// a comment\nimport package::base::{two};")
     with pytest.raises(WgslError, match=r"wrong.wgsl:2: base.wgsl does not declare two"):
-        wgsl.load("wrong", tmp_path)
-    write(tmp_path, lost="import package::nowhere::x;")
+        wgsl.load("wrong")
+    modules(lost="import package::nowhere::x;")
     with pytest.raises(WgslError, match=r"lost.wgsl:1: no module 'nowhere'"):
-        wgsl.load("lost", tmp_path)
-    write(tmp_path, a="import package::b::y;\nfn x() {}", b="import package::a::x;\nfn y() {}")
+        wgsl.load("lost")
+    modules(a="import package::b::y;\nfn x() {}", b="import package::a::x;\nfn y() {}")
     with pytest.raises(WgslError, match="circular import a -> b -> a"):
-        wgsl.load("a", tmp_path)
+        wgsl.load("a")
 
 
-def test_compiler_errors_point_into_the_imported_file(gpu, tmp_path):
-    write(tmp_path, base="\n\nfn one() -> f32 { return missing; }", top="import package::base::one;\n@compute @workgroup_size(1) fn main() { _ = one(); }")
+def test_compiler_errors_point_into_the_imported_file(gpu, modules):
+    modules(
+        base="\n\nfn one() -> f32 { return missing; }",
+        top="import package::base::one;\n@compute @workgroup_size(1) fn main() { _ = one(); }",
+    )
     with pytest.raises(WgslError, match=r"base\.wgsl:3:26"):
-        gpu.shader(wgsl.load("top", tmp_path))
+        gpu.shader(wgsl.load("top"))
 
 
-def test_reads_bindings_targets_and_workgroups(tmp_path):
-    write(tmp_path, m="""
+def test_reads_bindings_targets_and_workgroups(modules):
+    modules(
+        m="""
 const TILE: u32 = 8u;
 override COUNT: u32 = 4u;
 alias RGBA16Float = vec4f; alias R32Uint = u32;
@@ -139,8 +141,9 @@ struct Out { @location(1) id: R32Uint, @location(0) light: RGBA16Float, }
 @group(0) @binding(4) var image: texture_storage_2d<rgba16float, write>;
 @fragment fn fs() -> Out { return Out(1u, vec4f()); }
 @compute @workgroup_size(TILE, COUNT) fn cs() { }
-""")
-    module = wgsl.load("m", tmp_path)
+"""
+    )
+    module = wgsl.load("m")
     kinds = {n: (b.number, b.space, b.access) for n, b in module.bindings.items()}
     assert kinds == {"params": (0, "uniform", "read"), "map": (1, "texture", "read"), "linear_clamp": (2, "sampler", "read"),
                      "out": (3, "storage", "read_write"), "image": (4, "storage_texture", "write")}  # fmt: skip

@@ -59,14 +59,18 @@ def _emitters(light: Light, centre: Array) -> list[dict[str, Any]]:
     """Position, kind, power and normal of a light's emitters."""
     nowhere = (0.0, 0.0, 0.0)
     if isinstance(light, DirectionalLight):
-        return [{"position": -_unit(light.direction), "kind": DIRECTIONAL, "power": light.irradiance, "normal": nowhere}]
+        return [
+            {"position": -_unit(light.direction), "kind": DIRECTIONAL, "power": light.irradiance, "normal": nowhere}
+        ]
     if isinstance(light, PointLight):
         return [{"position": light.position, "kind": POINT, "power": light.intensity, "normal": nowhere}]
     if isinstance(light, EnvironmentLight):
         return []
     positions, normals, area = _rect(light) if isinstance(light, RectLight) else _sphere(light, centre)
     intensity = np.asarray(light.radiance) * (area * 1e-6 / len(positions))  # W/sr along the normal; area in mm^2
-    return [{"position": x, "kind": PATCH, "power": intensity, "normal": n} for x, n in zip(positions, normals, strict=True)]
+    return [
+        {"position": x, "kind": PATCH, "power": intensity, "normal": n} for x, n in zip(positions, normals, strict=True)
+    ]
 
 
 def _rect(light: RectLight) -> tuple[Array, Array, float]:
@@ -74,7 +78,10 @@ def _rect(light: RectLight) -> tuple[Array, Array, float]:
     normal = _unit(light.direction)
     right = _unit(np.cross(light.up, -normal))
     up = np.cross(-normal, right)
-    rows = max(range(1, light.samples + 1), key=lambda n: (light.samples % n == 0, -abs(n * n * light.width / light.height - light.samples)))
+    rows = max(
+        range(1, light.samples + 1),
+        key=lambda n: (light.samples % n == 0, -abs(n * n * light.width / light.height - light.samples)),
+    )
     columns = light.samples // rows
     across, along = np.meshgrid((np.arange(columns) + 0.5) / columns - 0.5, (np.arange(rows) + 0.5) / rows - 0.5)
     cells = across.reshape(-1, 1) * right * light.width + along.reshape(-1, 1) * up * light.height
@@ -90,7 +97,9 @@ def _sphere(light: SphereLight, centre: Array) -> tuple[Array, Array, float]:
     phi = math.pi * (3 - math.sqrt(5)) * i
     right = _unit(np.cross(towards, (0, 0, 1) if abs(towards[2]) < 0.9 else (1, 0, 0)))
     ring = np.sqrt(1 - z * z)[:, None]
-    normals = ring * (np.cos(phi)[:, None] * right + np.sin(phi)[:, None] * np.cross(towards, right)) + z[:, None] * towards
+    normals = (
+        ring * (np.cos(phi)[:, None] * right + np.sin(phi)[:, None] * np.cross(towards, right)) + z[:, None] * towards
+    )
     area = math.pi * light.radius**2 * light.samples / z.sum()
     return np.asarray(light.position) + light.radius * normals, normals, area
 
@@ -121,7 +130,11 @@ def _views(emitter: dict[str, Any], points: Array) -> list[dict[str, Any]]:
 
 
 def _view(camera: Any, near: float, far: float, extent: float, perspective: int) -> dict[str, Any]:
-    return {"world_to_clip": camera.projection(1.0, near, far) @ camera.view(), "extent": extent, "perspective": perspective}
+    return {
+        "world_to_clip": camera.projection(1.0, near, far) @ camera.view(),
+        "extent": extent,
+        "perspective": perspective,
+    }
 
 
 def _unit(v: Any) -> Array:

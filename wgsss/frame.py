@@ -102,7 +102,7 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
     drawn: Any = None
     for body in stage.bodies:
         kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("where_seen", "normal", "base_color")}
-        drawn = graph.draw("frame/gbuffer", size=size, indices=body.indices, depth="new" if drawn is None else drawn.depth, into=kept,
+        drawn = graph.draw("frame/gbuffer", size=size, indices=body.indices, depth_buffer="new" if drawn is None else drawn.depth, into=kept,
                            params=params, surface=body.surface, vertices=body.vertices, **vars(body.maps))  # fmt: skip
     return drawn
 
@@ -118,7 +118,7 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
         for layer, shadow_view in enumerate(found.views):
             for body in stage.bodies:
                 to_clip = shadow_view["world_to_clip"] @ body.rest.matrix
-                maps = graph.draw("frame/shadow", size=(side, side), indices=body.indices, depth=maps, layer=layer,
+                maps = graph.draw("frame/shadow", size=(side, side), indices=body.indices, depth_buffer=maps, layer=layer,
                                   params={"object_to_clip": to_clip}, vertices=body.vertices, label=str(layer))  # fmt: skip
     else:
         key = TextureKey((1, 1, 1), "depth32float", wgpu.TextureUsage.TEXTURE_BINDING)

@@ -61,7 +61,12 @@ FORMATS: dict[str, tuple[str, int]] = {  # texture format -> numpy scalar, chann
 SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what it does
     "nearest_clamp": {},
     "linear_clamp": {"mag_filter": "linear", "min_filter": "linear"},
-    "linear_repeat": {"mag_filter": "linear", "min_filter": "linear", "address_mode_u": "repeat", "address_mode_v": "repeat"},
+    "linear_repeat": {
+        "mag_filter": "linear",
+        "min_filter": "linear",
+        "address_mode_u": "repeat",
+        "address_mode_v": "repeat",
+    },
     "linear_wrap_u": {"mag_filter": "linear", "min_filter": "linear", "address_mode_u": "repeat"},
     "compare_less": {"mag_filter": "linear", "min_filter": "linear", "compare": "less-equal"},
 }
@@ -82,7 +87,11 @@ def adapters() -> list[Any]:
         extras.set_instance_extras(backends=["Vulkan"])
         adapters.instance = True  # type: ignore[attr-defined]
     wanted = os.environ.get("WGPUPY_WGPU_ADAPTER_NAME", "")
-    return [a for a in wgpu.gpu.enumerate_adapters_sync() if wanted in a.info["device"] and a.info["backend_type"] == "Vulkan"]
+    return [
+        a
+        for a in wgpu.gpu.enumerate_adapters_sync()
+        if wanted in a.info["device"] and a.info["backend_type"] == "Vulkan"
+    ]
 
 
 @dataclass(frozen=True)
@@ -107,8 +116,12 @@ class Gpu:
     def __init__(self) -> None:
         found = adapters()
         if not found:
-            raise InputError("no Vulkan adapter found: install a GPU driver, or Mesa's software driver (mesa-vulkan-drivers)")
-        found.sort(key=lambda a: ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown").index(a.info["adapter_type"]))
+            raise InputError(
+                "no Vulkan adapter found: install a GPU driver, or Mesa's software driver (mesa-vulkan-drivers)"
+            )
+        found.sort(
+            key=lambda a: ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown").index(a.info["adapter_type"])
+        )
         self.adapter = found[0]
         self.info = self.adapter.info
         self.is_cpu = self.info["adapter_type"] == "CPU"
@@ -152,7 +165,9 @@ class Gpu:
         """A buffer that holds `data`, to be bound as storage or used as an index buffer."""
         import wgpu
 
-        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDEX | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+        usage = (
+            wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDEX | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+        )
         raw = data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
         return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
 

@@ -64,6 +64,10 @@ class Handle:
     def format(self) -> str:
         return self.resource.format
 
+    def layer(self, asked: int) -> int:
+        """The layer that a pass for layer `asked` draws to: the only one, where there are no more."""
+        return asked if self.resource.size[2] > 1 else 0
+
     def __repr__(self) -> str:
         return f"{self.resource.name}@{self.version}"
 
@@ -116,6 +120,7 @@ class Graph:
         self.times: dict[str, float] = {}
         self.clock = "gpu timestamps" if gpu.has_timestamps else "fenced wall clock"
         self.peak_bytes = 0
+        self.uploaded_bytes = 0
         self._names: dict[str, int] = {}
         self._held: list[Resource] = []
 
@@ -126,7 +131,7 @@ class Graph:
     # declaring
 
     def texture(self, name: str, size: tuple[int, int, int], texture_format: str) -> Handle:
-        """A texture (width, height, layers) that several passes will write in turn, each through `into` or `depth`."""
+        """A texture (width, height, layers) that several passes will write in turn, each through `into` or `depth_buffer`."""
         return Handle(Resource(name, texture_format, size), 0)
 
     def draw(
@@ -138,7 +143,7 @@ class Graph:
         count: int = 3,
         instances: int = 1,
         into: Handle | Mapping[str, Handle] | None = None,
-        depth: Handle | Literal["new"] | None = None,
+        depth_buffer: Handle | Literal["new"] | None = None,
         depth_compare: str = "less",
         depth_write: bool = True,
         cull: str = "none",
@@ -150,10 +155,10 @@ class Graph:
         """Declare a raster pass of `wgsl/<module>.wgsl`; without `indices` (a u32 index buffer) a full-screen triangle.
 
         Args:
-            size: of the targets made, in texels; by default that of `into`, `depth` or the first texture bound.
+            size: of the targets made, in texels; by default that of `into`, `depth_buffer` or the first texture bound.
             into: targets to draw onto instead of new, cleared ones (a handle, or handles by output name).
-            depth: "new" for a cleared depth buffer, or the handle of one to test against and, with `depth_write`, write.
-            layer: of array textures given as `into` or `depth`.
+            depth_buffer: "new" for a cleared depth buffer, or the handle of one to test against and, with `depth_write`, write.
+            layer: of array textures given as `into` or `depth_buffer`.
             bindings: the module's bindings by name: handles, GPU resources that persist, or values to pack and upload.
 
         Returns:
@@ -164,29 +169,32 @@ class Graph:
         """
         loaded = wgsl.load(module)
         item = self._declare(loaded, label, constants, bindings)
-        given = dict(into) if isinstance(into, Mapping) else {t[0]: into for t in loaded.targets[:1] if into is not None}
+        given = (
+            dict(into) if isinstance(into, Mapping) else {t[0]: into for t in loaded.targets[:1] if into is not None}
+        )
         if size is None:
-            size = self._default_size([*given.values(), depth, *item.reads.values()], loaded)
+            size = self._default_size([*given.values(), depth_buffer, *item.reads.values()], loaded)
         targets = []
         for name, texture_format in loaded.targets:
             if name in given:
                 self._write_on(item, name, given[name])
             else:
                 self._write_new(item, name, Resource(f"{item.name}.{name}", texture_format, (*size, 1)))
-            targets.append((name, layer in item.writes[name].resource.drawn))
-        if depth == "new":
+            targets.append((name, item.writes[name].layer(layer) in item.writes[name].resource.drawn))
+        if depth_buffer == "new":
             self._write_new(item, "depth", Resource(f"{item.name}.depth", "depth32float", (*size, 1)))
-        elif isinstance(depth, Handle) and depth_write:
-            self._write_on(item, "depth", depth)
-        elif isinstance(depth, Handle):
-            item.reads["depth"] = self._checked(depth)
-        depth_name = "depth" if depth is not None else None
-        keep_depth = "depth" in item.writes and layer in item.writes["depth"].resource.drawn
+        elif isinstance(depth_buffer, Handle) and depth_write:
+            self._write_on(item, "depth", depth_buffer)
+        elif isinstance(depth_buffer, Handle):
+            item.reads["depth"] = self._checked(depth_buffer)
+        depth_name = "depth" if depth_buffer is not None else None
+        written = item.writes.get("depth")
+        keep_depth = written is not None and written.layer(layer) in written.resource.drawn
         import wgpu
 
         for handle in item.writes.values():
             handle.resource.usage |= wgpu.TextureUsage.RENDER_ATTACHMENT
-            handle.resource.drawn.add(layer)
+            handle.resource.drawn.add(handle.layer(layer))
         if indices is not None and count == 3:
             count = indices.size // 4
         item.state = _Draw(tuple(targets), depth_name, depth_compare, depth_write, keep_depth, cull, layer, indices, count,
@@ -208,10 +216,15 @@ class Graph:
         written in place. Returns and raises as `draw`.
         """
         loaded = wgsl.load(module)
-        written = {n: b for n, b in loaded.bindings.items() if b.access in ("write", "read_write") and b.space != "sampler"}
+        written = {
+            n: b for n, b in loaded.bindings.items() if b.access in ("write", "read_write") and b.space != "sampler"
+        }
         item = self._declare(loaded, label, constants, bindings, made=set(written) - set(bindings))
         if size is None:
-            size = self._default_size([bindings[n] for n in written if isinstance(bindings.get(n), Handle)] or list(item.reads.values()), loaded)
+            size = self._default_size(
+                [bindings[n] for n in written if isinstance(bindings.get(n), Handle)] or list(item.reads.values()),
+                loaded,
+            )
         extent = (size, 1, 1) if isinstance(size, int) else (*size, 1)[:3]
         for name, binding in written.items():
             handle = item.reads.get(name)
@@ -236,7 +249,9 @@ class Graph:
             raise WgslError(_mismatch(module, wanted, bindings))
         unknown = set(item.constants) - set(module.overrides)
         if unknown:
-            raise WgslError(f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {', '.join(module.overrides)})")
+            raise WgslError(
+                f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {', '.join(module.overrides)})"
+            )
         for key, value in bindings.items():
             self._bind(item, wanted[key], value)
         self.passes.append(item)
@@ -251,7 +266,10 @@ class Graph:
                 raise WgslError(f"{item.module.name}: '{binding.name}' is a {binding.type}, got {value!r}")
             if value.version == 0 and binding.access == "read":
                 raise WgslError(f"{item.module.name}: '{binding.name}' is {value!r}, which no pass has written")
-            value.resource.usage |= {"texture": wgpu.TextureUsage.TEXTURE_BINDING, "storage_texture": wgpu.TextureUsage.STORAGE_BINDING}.get(binding.space, wgpu.BufferUsage.STORAGE)
+            value.resource.usage |= {
+                "texture": wgpu.TextureUsage.TEXTURE_BINDING,
+                "storage_texture": wgpu.TextureUsage.STORAGE_BINDING,
+            }.get(binding.space, wgpu.BufferUsage.STORAGE)
             item.reads[binding.name] = self._checked(value)
         elif isinstance(value, wgpu.GPUTexture if wants_texture else wgpu.GPUBuffer):
             item.imports[binding.name] = value
@@ -350,8 +368,11 @@ class Graph:
         return handle.resource.gpu
 
     def _allocate(self, resource: Resource) -> None:
+        import wgpu
+
         if resource.layout is not None:
-            resource.gpu, resource.key = self.gpu.acquire_buffer(resource.nbytes, resource.usage)
+            usage = resource.usage | wgpu.BufferUsage.COPY_DST
+            resource.gpu, resource.key = self.gpu.acquire_buffer(resource.nbytes, usage)
         else:
             resource.key = TextureKey(resource.size, resource.format, resource.usage)
             resource.gpu = self.gpu.acquire(resource.key)
@@ -375,6 +396,7 @@ class Graph:
         usage = wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST
         arena, key = self.gpu.acquire_buffer(end, usage)
         self.gpu.queue.write_buffer(arena, 0, b"".join(chunks))
+        self.uploaded_bytes = end
         return arena, key, offsets
 
     def _bind_group(self, item: Pass, arena: Any, offsets: Mapping[tuple[Pass, str], int]) -> tuple[Any, Any]:
@@ -405,7 +427,10 @@ class Graph:
             writes = " ".join(f"{n}:{h.size[0]}x{h.size[1]}:{h.format or 'buffer'}" for n, h in item.writes.items())
             rows.append((item.name, reads, writes, ms))
         widths = [max(len(row[c]) for row in rows) for c in range(4)]
-        lines = ["  ".join([*(cell.ljust(w) for cell, w in zip(row[:3], widths[:3], strict=True)), row[3].rjust(widths[3])]) for row in rows]
+        lines = [
+            "  ".join([*(cell.ljust(w) for cell, w in zip(row[:3], widths[:3], strict=True)), row[3].rjust(widths[3])])
+            for row in rows
+        ]
         total = sum(self.times.values())
         lines.append(f"{len(self.ran)} passes ran, {len(self.culled)} culled; {total:.2f} ms ({self.clock}); "
                      f"{self.peak_bytes / 2**20:.1f} MiB of transients live at most")  # fmt: skip
@@ -459,13 +484,19 @@ def _pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
 
     def make() -> Any:
         stage = {"module": gpu.shader(module), "constants": constants}
-        fragment = {**stage, "entry_point": module.stages["fragment"], "targets": [{"format": f} for f in formats]} if formats else None
+        fragment = (
+            {**stage, "entry_point": module.stages["fragment"], "targets": [{"format": f} for f in formats]}
+            if formats
+            else None
+        )
         return gpu.device.create_render_pipeline(
             layout="auto",
             label=module.name,
             vertex={**stage, "entry_point": module.stages["vertex"], "buffers": []},
             primitive={"topology": "triangle-list", "cull_mode": state.cull},
-            depth_stencil={"format": "depth32float", "depth_compare": depth[0], "depth_write_enabled": depth[1]} if depth else None,
+            depth_stencil={"format": "depth32float", "depth_compare": depth[0], "depth_write_enabled": depth[1]}
+            if depth
+            else None,
             fragment=fragment,
         )
 
@@ -479,7 +510,11 @@ class _Timer:
         self.graph, self.gpu = graph, graph.gpu
         self.stamps = timed and self.gpu.has_timestamps
         self.walls = timed and not self.stamps
-        self.queries = self.gpu.device.create_query_set(type="timestamp", count=2 * max(len(graph.ran), 1)) if self.stamps else None
+        self.queries = (
+            self.gpu.device.create_query_set(type="timestamp", count=2 * max(len(graph.ran), 1))
+            if self.stamps
+            else None
+        )
         self.encoder: Any = None
         if self.walls:
             self.gpu.fence()
@@ -489,8 +524,17 @@ class _Timer:
             self.encoder = self.gpu.device.create_command_encoder()
         stamps: dict[str, Any] = {}
         if self.stamps:
-            stamps = {"timestamp_writes": {"query_set": self.queries, "beginning_of_pass_write_index": 2 * i, "end_of_pass_write_index": 2 * i + 1}}
+            stamps = {
+                "timestamp_writes": {
+                    "query_set": self.queries,
+                    "beginning_of_pass_write_index": 2 * i,
+                    "end_of_pass_write_index": 2 * i + 1,
+                }
+            }
         start = time.perf_counter()
+        for handle in item.writes.values():
+            if handle.version == 1 and handle.resource.layout is not None:  # pooled buffers hold what was there before
+                self.encoder.clear_buffer(handle.resource.gpu)
         (_encode_dispatch if isinstance(item.state, _Dispatch) else _encode_draw)(self.encoder, item, *bound, stamps)
         if self.walls:
             self._submit()
@@ -509,11 +553,15 @@ class _Timer:
         if not self.stamps:
             return self._submit()
         count = 2 * len(self.graph.ran)
-        resolved = self.gpu.device.create_buffer(size=8 * count, usage=wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC)
+        resolved = self.gpu.device.create_buffer(
+            size=8 * count, usage=wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
+        )
         self.encoder.resolve_query_set(self.queries, 0, count, resolved, 0)
         self._submit()
         ticks = np.frombuffer(self.gpu.queue.read_buffer(resolved), np.uint64).reshape(-1, 2)  # nanoseconds
-        self.graph.times = {p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.graph.ran, ticks, strict=True)}
+        self.graph.times = {
+            p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.graph.ran, ticks, strict=True)
+        }
 
 
 def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
@@ -528,10 +576,17 @@ def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: di
     state: _Draw = item.state
 
     def view(handle: Handle) -> Any:
-        return handle.resource.gpu.create_view(dimension="2d", base_array_layer=state.layer, array_layer_count=1)
+        return handle.resource.gpu.create_view(
+            dimension="2d", base_array_layer=handle.layer(state.layer), array_layer_count=1
+        )
 
     colors = [
-        {"view": view(item.writes[name]), "load_op": "load" if kept else "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
+        {
+            "view": view(item.writes[name]),
+            "load_op": "load" if kept else "clear",
+            "store_op": "store",
+            "clear_value": (0, 0, 0, 0),
+        }
         for name, kept in state.targets
     ]
     depth = None
@@ -539,10 +594,16 @@ def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: di
         handle = item.writes.get(state.depth) or item.reads[state.depth]
         depth = {"view": view(handle)}
         if state.depth_write:
-            depth |= {"depth_load_op": "load" if state.keep_depth else "clear", "depth_store_op": "store", "depth_clear_value": 1.0}
+            depth |= {
+                "depth_load_op": "load" if state.keep_depth else "clear",
+                "depth_store_op": "store",
+                "depth_clear_value": 1.0,
+            }
         else:
             depth |= {"depth_read_only": True}
-    render = encoder.begin_render_pass(color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps)
+    render = encoder.begin_render_pass(
+        color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps
+    )
     render.set_pipeline(pipeline)
     if group is not None:
         render.set_bind_group(0, group)

@@ -21,7 +21,9 @@ ROOT = _PACKAGE / "wgsl" if (_PACKAGE / "wgsl").is_dir() else _PACKAGE.parent / 
 
 _IMPORT = re.compile(r"^\s*import\s+package((?:::\w+)+?)(?:::\{([^}]*)\}|::(\w+));[^\S\n]*$", re.M)
 _DECLARATION = re.compile(r"\b(?:fn|struct|alias|const|override|var)\s*(?:<[^>]*>)?\s*(\w+)")
-_BINDING = re.compile(r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var\s*(?:<\s*(\w+)\s*(?:,\s*(\w+)\s*)?>)?\s*(\w+)\s*:\s*([^;]+);")
+_BINDING = re.compile(
+    r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var\s*(?:<\s*(\w+)\s*(?:,\s*(\w+)\s*)?>)?\s*(\w+)\s*:\s*([^;]+);"
+)
 _STRUCT = re.compile(r"\bstruct\s+(\w+)\s*\{([^}]*)\}")
 _FIELD = re.compile(r"((?:@\w+(?:\([^)]*\))?\s*)*)(\w+)\s*:\s*((?:[^,<]|<(?:[^<>]|<[^>]*>)*>)+)(?:,|$)")
 _ALIAS = re.compile(r"\balias\s+(\w+)\s*=\s*([^;]+);")
@@ -182,7 +184,11 @@ class Module:
         match = _WORKGROUP.search(self._clean)
         if not match:
             raise WgslError(f"{self.name}: no @workgroup_size")
-        defaults = {name: self._integer(value, {}) for name, value in _OVERRIDE.findall(self._clean) if value[:1].isdigit() and "." not in value}
+        defaults = {
+            name: self._integer(value, {})
+            for name, value in _OVERRIDE.findall(self._clean)
+            if value[:1].isdigit() and "." not in value
+        }
         known = {**self.constants, **defaults, **{name: int(value) for name, value in overrides.items()}}
         sizes = [self._integer(p.strip(), known) for p in match.group(1).split(",") if p.strip()]
         x, y, z = (*sizes, 1, 1)[:3]
@@ -265,7 +271,9 @@ class Module:
             dtype = _padded(element, stride)
             if count is None:
                 return Layout(kind, stride, element.align, dtype, element=element, count=None)
-            return Layout(kind, stride * count, element.align, np.dtype((dtype, (count,))), element=element, count=count)
+            return Layout(
+                kind, stride * count, element.align, np.dtype((dtype, (count,))), element=element, count=count
+            )
         if kind in self.structs:
             return self._struct_layout(kind)
         raise WgslError(f"{self.name}: '{kind}' is not a host-shareable type declared here")
@@ -304,7 +312,9 @@ def _padded(layout: Layout, stride: int) -> np.dtype:
     return np.dtype({"names": ["value"], "formats": [layout.dtype], "offsets": [0], "itemsize": stride})
 
 
-def _resolve(name: str, root: Path, done: dict[str, str], chain: tuple[str, ...], asked_by: str) -> list[tuple[str, str, int]]:
+def _resolve(
+    name: str, root: Path, done: dict[str, str], chain: tuple[str, ...], asked_by: str
+) -> list[tuple[str, str, int]]:
     """Lines of module `name` and of what it imports, each once: (text, file, line)."""
     if name in chain:
         raise WgslError(f"{asked_by}: circular import {' -> '.join((*chain, name))}")

@@ -54,7 +54,12 @@ def prefilter(gpu: Gpu, lights: Sequence[EnvironmentLight], material: Material) 
         return {"irradiance": graph.read(irradiance), "reflection": graph.read(reflection)}
 
     key = [pixels, material.roughness, material.eta, material.specular]
-    maps = cached("environment", key, make, sources=(__name__, "frame/prefilter_irradiance", "frame/prefilter_reflection", "frame/rho_dt"))
+    maps = cached(
+        "environment",
+        key,
+        make,
+        sources=(__name__, "frame/prefilter_irradiance", "frame/prefilter_reflection", "frame/rho_dt"),
+    )
     return Prefiltered(*(gpu.texture(maps[name], "rgba16float") for name in ("irradiance", "reflection")))
 
 

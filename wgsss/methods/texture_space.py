@@ -29,7 +29,9 @@ _AXES = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 class TextureSpace:
     """M_front as the sum of w_k G(v_k) * L_d over the atlas; M_back is not estimated."""
 
-    map_size: int = field(default=1024, metadata={"unit": "texels", "range": (64, 4096), "help": "side of the irradiance map"})
+    map_size: int = field(
+        default=1024, metadata={"unit": "texels", "range": (64, 4096), "help": "side of the irradiance map"}
+    )
     gaussians: int = field(default=6, metadata={"unit": "", "range": (1, 6), "help": "Gaussians in the sum"})
 
     source: ClassVar[str] = "d'Eon & Luebke 2007, GPU Gems 3, chapter 14; Mikkelsen 2009, section 3.4"
@@ -45,14 +47,18 @@ class TextureSpace:
         """The atlas of a body at this method's map size."""
         surface = body.unwrap()
         mesh, stage = body.rest.mesh, body.stage
-        return stage.shared(("charts", id(mesh), self.map_size), lambda: charts(stage.gpu, mesh, surface, self.map_size))
+        return stage.shared(
+            ("charts", id(mesh), self.map_size), lambda: charts(stage.gpu, mesh, surface, self.map_size)
+        )
 
     def profile(self, body: Body) -> SumOfGaussians:
         """The sum of Gaussians of a body's material: its own where it has at most as many, else a fit."""
         profile = body.material.profile
         if isinstance(profile, SumOfGaussians) and len(profile.variances) <= self.gaussians:
             return profile
-        return body.stage.shared(("fit", id(body.material), self.gaussians), lambda: fit_gaussians(profile, self.gaussians))
+        return body.stage.shared(
+            ("fit", id(body.material), self.gaussians), lambda: fit_gaussians(profile, self.gaussians)
+        )
 
     def passes(self, frame: Frame) -> Diffused:
         M_front: Any = None
@@ -75,7 +81,12 @@ def blurs(graph: Graph, irradiance: Handle, atlas: Charts, profile: SumOfGaussia
     found, reached = [], 0.0
     for k, variance in enumerate(profile.variances):
         for direction in (0, 1):
-            params = {"axis": _AXES[k % 3], "direction": direction, "sigma": np.sqrt(variance - reached), "smooth_to": np.sqrt(reached)}
+            params = {
+                "axis": _AXES[k % 3],
+                "direction": direction,
+                "sigma": np.sqrt(variance - reached),
+                "smooth_to": np.sqrt(reached),
+            }
             blurred = graph.draw("texture_space/blur", source=blurred, gradient_u=atlas.gradient_u, gradient_v=atlas.gradient_v,
                                  params=params, label=f"{variance:.3g} mm2 {'uv'[direction]}", **seams)  # fmt: skip
         reached = float(variance)
