@@ -28,8 +28,8 @@ def limb(x: np.ndarray, y: np.ndarray, z: np.ndarray, a: Point, b: Point, ra: fl
     run = np.subtract(b, a)
     along = ((x - a[0]) * run[0] + (y - a[1]) * run[1] + (z - a[2]) * run[2]) / (run @ run)
     along = np.clip(along, 0, 1)
-    off = np.sqrt((x - a[0] - along * run[0]) ** 2 + (y - a[1] - along * run[1]) ** 2 + (z - a[2] - along * run[2]) ** 2)
-    return off - (ra + along * (rb - ra))
+    near = [a[k] + along * run[k] for k in range(3)]
+    return np.sqrt((x - near[0]) ** 2 + (y - near[1]) ** 2 + (z - near[2]) ** 2) - (ra + along * (rb - ra))
 
 
 def join(a: np.ndarray, b: np.ndarray, blend: float) -> np.ndarray:

@@ -13,7 +13,7 @@ _SHELL = 2.0  # mm, thickness of the shell along its normal
 _CENTRE = np.array([0.0, 1.0])
 
 # Seen from the side of the head: x towards the nose is negative, y up; mm. With each point of the outline comes the
-# radius of the rim there: the helix is thick at the top, the lobe soft, the edge on the cheek no thicker than the shell.
+# radius of the rim there: the helix is thick at the top, the lobe soft, the edge on the cheek as thin as the shell.
 _OUTLINE = np.array(
     [
         (1.0, 30.0, 3.1), (9.5, 27.6, 3.0), (15.3, 21.0, 2.8), (17.6, 11.5, 2.6), (16.8, 1.0, 2.4),
@@ -25,7 +25,11 @@ _OUTLINE = np.array(
 
 # Ridges: the points of a curve, its height at each (mm, towards the viewer) and its half width (mm).
 _Ridge = tuple[tuple[tuple[float, float], ...], tuple[float, ...], float]
-_ANTIHELIX: _Ridge = (((0.5, -15.0), (5.0, -11.5), (8.2, -4.0), (8.4, 4.0), (6.0, 11.5), (2.5, 17.5), (0.0, 22.0)), (3.5, 5.0, 5.6, 5.6, 5.0, 4.0, 2.0), 1.9)
+_ANTIHELIX: _Ridge = (
+    ((0.5, -15.0), (5.0, -11.5), (8.2, -4.0), (8.4, 4.0), (6.0, 11.5), (2.5, 17.5), (0.0, 22.0)),
+    (3.5, 5.0, 5.6, 5.6, 5.0, 4.0, 2.0),
+    1.9,
+)
 _LOWER_CRUS = (((7.6, 6.0), (3.0, 10.0), (-3.0, 12.6), (-9.5, 14.0)), (3.0, 5.0, 4.6, 0.5), 1.7)
 _HELIX_CRUS = (((-12.0, 9.0), (-9.6, 4.6), (-5.0, 1.2), (0.5, -0.6)), (0.5, 4.0, 6.0, 2.0), 1.7)
 _TRAGUS = (((-9.4, -2.5), (-7.6, -6.5), (-7.6, -10.5)), (3.0, 7.0, 3.0), 1.9)
@@ -36,7 +40,6 @@ _LOBE = (((-3.5, -22.5), (2.0, -22.5)), (2.2, 2.2), 3.6)
 _HOLLOWS = ((2.0, 5.0, 5.6, 4.4), (2.6, -2.0, 5.6, 4.4), (-0.8, -8.0, 5.2, 4.2), (-4.2, -5.5, 4.0, 2.8))
 _FOLDS = (_ANTIHELIX, _LOWER_CRUS)
 _FRONT_ONLY = (_HELIX_CRUS, _TRAGUS, _ANTITRAGUS, _LOBE)
-
 
 
 def ear(vertices: int | None = None) -> Mesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -103,7 +104,7 @@ def _cut(positions: np.ndarray, faces: np.ndarray, spacing: float) -> tuple[np.n
 def _onto_cut(positions: np.ndarray, radius: float) -> np.ndarray:
     """Positions moved onto the curve where gyroid and ball meet, by Newton steps in the plane of both gradients."""
     for _ in range(4):
-        value, gradient = _field(positions)
+        _, gradient = _field(positions)
         normal = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
         distance = np.linalg.norm(positions, axis=1)
         out = positions / distance[:, None]
@@ -164,7 +165,7 @@ def _thicken(positions: np.ndarray, faces: np.ndarray, spacing: float) -> Mesh:
 
     a, b = rim.T
     strips = []
-    for upper, lower in zip(rows[:-1], rows[1:], strict=True):
+    for upper, lower in pairwise(rows):
         strips += [np.stack([upper[b], upper[a], lower[a]], 1), np.stack([upper[b], lower[a], lower[b]], 1)]
     faces = np.concatenate([faces, faces[:, ::-1] + count, *strips]).astype(np.int32)
     positions = relax(np.concatenate(layers), faces, steps=2)

@@ -14,9 +14,9 @@ def vertex_count(shape: str, vertices: int | None, default: int, low: int, high:
     """The approximate vertex count to aim at. Raises InputError outside low..high."""
     if vertices is None:
         return default
-    if not low <= vertices <= high:
-        raise InputError(f"{shape}: vertices must be between {low} and {high}, got {vertices}")
-    return int(vertices)
+    if not isinstance(vertices, int) or not low <= vertices <= high:
+        raise InputError(f"{shape}: vertices must be a whole number from {low} to {high}, not {vertices!r}")
+    return vertices
 
 
 def fit_spacing(count: Callable[[float], int], vertices: int) -> float:
@@ -39,9 +39,9 @@ def spread(counts: np.ndarray, *, closed: bool) -> np.ndarray:
 def join_rows(counts: np.ndarray, params: np.ndarray, *, closed: bool) -> np.ndarray:
     """Faces (F,3) between each row of points and the next; rows of one point become fans.
 
-    counts (R,): points per row; params (sum(counts),): rising within each row, 0..1. Seen with the parameter to the right
-    and the next row above, the triangles are counter-clockwise. Edges advance in the order of their middles, so rows of
-    different counts meet without slivers.
+    counts (R,): points per row; params (sum(counts),): rising within each row, 0..1. Seen with the parameter to the
+    right and the next row above, the triangles are counter-clockwise. Edges advance in the order of their middles, so
+    rows of different counts meet without slivers.
     """
     starts = np.cumsum(counts) - counts
     edges = np.where(counts > 1, counts if closed else counts - 1, 0)

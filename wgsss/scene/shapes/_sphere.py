@@ -52,6 +52,7 @@ def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
     corners = np.array([np.roll((0, s, t * golden), k) for k in range(3) for s, t in signs]) / math.hypot(1, golden)
     near = np.linalg.norm(corners[:, None] - corners[None], axis=2) < 1.1  # an edge is 1.05 long
     np.fill_diagonal(near, False)
-    faces = [(a, b, c) for a in range(12) for b in range(a) for c in range(b) if near[a, b] and near[b, c] and near[c, a]]
+    triples = ((a, b, c) for a in range(12) for b in range(a) for c in range(b))
+    faces = [(a, b, c) for a, b, c in triples if near[a, b] and near[b, c] and near[c, a]]
     turn = [np.linalg.det(corners[list(f)]) > 0 for f in faces]
     return corners, np.array([f if t else f[::-1] for f, t in zip(faces, turn, strict=True)])

@@ -79,7 +79,8 @@ def _body(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     covered = covered * covered * (3 - 2 * covered)
     along = 0.62 * x + 0.80 * y + 0.15 * z + 1.5 * np.sin(0.13 * (x - y))
     cloth = whole - 0.9 * covered * np.clip((y - 36) / 8, 0, 1)
-    cloth = cloth - 0.55 * covered * _folds(along / 6.5, whole) * np.clip((y - 38) / 10, 0, 1) * np.clip((104 - y) / 12, 0, 1)
+    fade = np.clip((y - 38) / 10, 0, 1) * np.clip((104 - y) / 12, 0, 1)
+    cloth = cloth - 0.55 * covered * fade * _folds(along / 6.5, whole)
     roll = np.sqrt((slant - 0.6) ** 2 + whole**2) - 1.5
     roll = np.maximum(roll, 40 - y)
     cloth = join(cloth, roll, 1.2)
