@@ -131,7 +131,8 @@ def test_misfits_list_what_is_wanted_and_given(graph):
     a = graph.draw("fill", level=1.0, size=(2, 2))
     with pytest.raises(
         WgslError,
-        match=r"add wants left: texture_2d<f32>, right: .*; was given left, rigth; missing: right; unknown: rigth \(did you mean 'right'\?\)",
+        match=r"add wants left: texture_2d<f32>, right: .*; was given left, rigth; "
+        r"missing: right; unknown: rigth \(did you mean 'right'\?\)",
     ):
         graph.draw("add", left=a, rigth=a)
     with pytest.raises(WgslError, match="'right' is a texture_2d<f32>, got float"):

@@ -32,10 +32,12 @@ READ_BACK = [  # an expression of vec4f for each field, and what it must be
     ("vec4f(all.m43[3], all.m23[1].z)", lambda v: [*v["m43"][:, 3], v["m23"][2, 1]]),
     ("vec4f(all.inner.a, all.inner.b)", lambda v: [*v["inner"]["a"], v["inner"]["b"]]),
     ("vec4f(all.inner.c[2].xy, all.list[1].zw)", lambda v: [*v["inner"]["c"][2][:2], *v["list"][1][2:]]),
-    ("vec4f(all.more[1].c[1].xy, all.more[1].b, all.more[0].b)",
-     lambda v: [*v["more"]["c"][1][1][:2], v["more"]["b"][1], v["more"]["b"][0]]),
+    (
+        "vec4f(all.more[1].c[1].xy, all.more[1].b, all.more[0].b)",
+        lambda v: [*v["more"]["c"][1][1][:2], v["more"]["b"][1], v["more"]["b"][0]],
+    ),
     ("vec4f(all.last, 1.0)", lambda v: [*v["last"], 1]),
-]  # fmt: skip
+]
 
 
 def random_all(rng, pair):
@@ -43,11 +45,26 @@ def random_all(rng, pair):
         return rng.uniform(-9, 9, shape).astype(np.float32)
 
     return dict(
-        f=number(), v3=number(3), i=-7, u=9, v2=number(2), v4=number(4), vi=np.array([1, -2, 3]), vu=np.array([4, 5]),
-        m2=number(2, 2), m3=number(3, 3), m4=number(4, 4), m34=number(4, 3), m43=number(3, 4), m23=number(3, 2),
-        inner=dict(a=number(3), b=number(), c=number(3, pair)), list=number(2, 4), pad=number(),
-        more=dict(a=number(2, 3), b=number(2), c=number(2, 3, pair)), last=number(3),
-    )  # fmt: skip
+        f=number(),
+        v3=number(3),
+        i=-7,
+        u=9,
+        v2=number(2),
+        v4=number(4),
+        vi=np.array([1, -2, 3]),
+        vu=np.array([4, 5]),
+        m2=number(2, 2),
+        m3=number(3, 3),
+        m4=number(4, 4),
+        m34=number(4, 3),
+        m43=number(3, 4),
+        m23=number(3, 2),
+        inner=dict(a=number(3), b=number(), c=number(3, pair)),
+        list=number(2, 4),
+        pad=number(),
+        more=dict(a=number(2, 3), b=number(2), c=number(2, 3, pair)),
+        last=number(3),
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,9 +118,10 @@ def test_misfits_name_the_field(modules, value, complaint):
 
 def test_imports_include_a_file_once_and_check_names(modules):
     modules(
-          base="fn one() -> f32 { return 1.0; }",
-          left="import package::base::{one};\nfn left() -> f32 { return one(); }",
-          top="import package::left::{left};\nimport package::base::one;\nfn top() -> f32 { return left() + one(); }")  # fmt: skip
+        base="fn one() -> f32 { return 1.0; }",
+        left="import package::base::{one};\nfn left() -> f32 { return one(); }",
+        top="import package::left::{left};\nimport package::base::one;\nfn top() -> f32 { return left() + one(); }",
+    )
     module = wgsl.load("top")
     assert module.source.count("fn one") == 1
     assert "import" not in module.source
@@ -145,8 +163,13 @@ struct Out { @location(1) id: R32Uint, @location(0) light: RGBA16Float, }
     )
     module = wgsl.load("m")
     kinds = {n: (b.number, b.space, b.access) for n, b in module.bindings.items()}
-    assert kinds == {"params": (0, "uniform", "read"), "map": (1, "texture", "read"), "linear_clamp": (2, "sampler", "read"),
-                     "out": (3, "storage", "read_write"), "image": (4, "storage_texture", "write")}  # fmt: skip
+    assert kinds == {
+        "params": (0, "uniform", "read"),
+        "map": (1, "texture", "read"),
+        "linear_clamp": (2, "sampler", "read"),
+        "out": (3, "storage", "read_write"),
+        "image": (4, "storage_texture", "write"),
+    }
     assert module.targets == (("light", "rgba16float"), ("id", "r32uint"))
     assert module.workgroup_size({}) == (8, 4, 1)
     assert module.workgroup_size({"COUNT": 2}) == (8, 2, 1)

@@ -19,8 +19,14 @@ Array = npt.NDArray[Any]
 DIRECTIONAL, POINT, PATCH = 0, 1, 2  # wgsl/light.wgsl
 WIDEST_VIEW = 120.0  # degrees: a light that sees the scene within less gets one view of it, another a cube of six
 MAX_VIEWS = 256  # layers of an array texture that every adapter has
-_CUBE = (((1, 0, 0), (0, 1, 0)), ((-1, 0, 0), (0, 1, 0)), ((0, 1, 0), (0, 0, 1)),
-         ((0, -1, 0), (0, 0, 1)), ((0, 0, 1), (0, 1, 0)), ((0, 0, -1), (0, 1, 0)))  # fmt: skip
+_CUBE = (
+    ((1, 0, 0), (0, 1, 0)),
+    ((-1, 0, 0), (0, 1, 0)),
+    ((0, 1, 0), (0, 0, 1)),
+    ((0, -1, 0), (0, 0, 1)),
+    ((0, 0, 1), (0, 1, 0)),
+    ((0, 0, -1), (0, 1, 0)),
+)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from wgsss.scene import OrthographicCamera, Scene
 from wgsss.scene.scene import TONE_MAPS
 from wgsss.stage import Body, Stage
 
-Matrix = npt.NDArray[np.float64]
+Matrix = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class View:
 class Frame:
     """What methods draw from: the stage, the view, the g-buffer and the lights.
 
-    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps, and `count` of lights.
+    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, their `count`, views and shadow_maps.
     """
 
     graph: Graph
@@ -59,7 +59,7 @@ class Frame:
             "rho_dt_table": self.rho_dt_table(body),
         }
 
-    def seen(self, *names: str) -> dict[str, Handle]:
+    def seen(self, *names: str) -> dict[str, Any]:
         """Parts of the g-buffer by binding name."""
         return {name: getattr(self.gbuffer, name) for name in names}
 
@@ -102,8 +102,17 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
     drawn: Any = None
     for body in stage.bodies:
         kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("where_seen", "normal", "base_color")}
-        drawn = graph.draw("frame/gbuffer", size=size, indices=body.indices, depth_buffer="new" if drawn is None else drawn.depth, into=kept,
-                           params=params, surface=body.surface, vertices=body.vertices, **vars(body.maps))  # fmt: skip
+        drawn = graph.draw(
+            "frame/gbuffer",
+            size=size,
+            indices=body.indices,
+            depth_buffer="new" if drawn is None else drawn.depth,
+            into=kept,
+            params=params,
+            surface=body.surface,
+            vertices=body.vertices,
+            **vars(body.maps),
+        )
     return drawn
 
 
@@ -118,8 +127,16 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
         for layer, shadow_view in enumerate(found.views):
             for body in stage.bodies:
                 to_clip = shadow_view["world_to_clip"] @ body.rest.matrix
-                maps = graph.draw("frame/shadow", size=(side, side), indices=body.indices, depth_buffer=maps, layer=layer,
-                                  params={"object_to_clip": to_clip}, vertices=body.vertices, label=str(layer))  # fmt: skip
+                maps = graph.draw(
+                    "frame/shadow",
+                    size=(side, side),
+                    indices=body.indices,
+                    depth_buffer=maps,
+                    layer=layer,
+                    params={"object_to_clip": to_clip},
+                    vertices=body.vertices,
+                    label=str(layer),
+                )
     else:
         key = TextureKey((1, 1, 1), "depth32float", wgpu.TextureUsage.TEXTURE_BINDING)
         maps = stage.shared(key, lambda: stage.gpu.acquire(key))
@@ -131,35 +148,65 @@ def irradiance_pixels(frame: Frame) -> Handle:
     irradiance: Any = None
     for body in frame.stage.bodies:
         params = {"clip_to_world": frame.view.clip_to_world, "lights": frame.lighting.count}
-        irradiance = frame.graph.draw("frame/irradiance_pixels", into=irradiance, size=frame.size, params=params,
-                                      environment=body.environment.irradiance, **frame.seen("where_seen", "normal", "depth"),
-                                      **frame.light_bindings(body))  # fmt: skip
+        irradiance = frame.graph.draw(
+            "frame/irradiance_pixels",
+            into=irradiance,
+            size=frame.size,
+            params=params,
+            environment=body.environment.irradiance,
+            **frame.seen("where_seen", "normal", "depth"),
+            **frame.light_bindings(body),
+        )
     return irradiance
 
 
 def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
     """L_d, W/m^2, over a body's atlas, times the share of its base colour that is applied before diffusion."""
-    return frame.graph.draw("frame/irradiance_texels", size=(map_size, map_size), indices=body.indices,
-                            params={"lights": frame.lighting.count}, vertices=body.vertices, environment=body.environment.irradiance,
-                            **vars(body.maps), **frame.light_bindings(body))  # fmt: skip
+    return frame.graph.draw(
+        "frame/irradiance_texels",
+        size=(map_size, map_size),
+        indices=body.indices,
+        params={"lights": frame.lighting.count},
+        vertices=body.vertices,
+        environment=body.environment.irradiance,
+        **vars(body.maps),
+        **frame.light_bindings(body),
+    )
 
 
 def irradiance_vertices(frame: Frame, body: Body) -> Handle:
     """L_d, W/m^2, at a body's render vertices: a buffer of vec4f."""
     count = len(body.layout.vertex)
-    return frame.graph.dispatch("frame/irradiance_vertices", size=count, params={"lights": frame.lighting.count, "vertices": count},
-                                vertices=body.vertices, environment=body.environment.irradiance, **frame.light_bindings(body))  # fmt: skip
+    return frame.graph.dispatch(
+        "frame/irradiance_vertices",
+        size=count,
+        params={"lights": frame.lighting.count, "vertices": count},
+        vertices=body.vertices,
+        environment=body.environment.irradiance,
+        **frame.light_bindings(body),
+    )
 
 
 def specular(frame: Frame) -> Handle:
     """Radiance reflected at the surface, W/(m^2 sr)."""
     reflected: Any = None
     for body in frame.stage.bodies:
-        params = {"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye, "alpha": body.material.roughness**2,
-                  "eta": body.material.eta, "lights": frame.lighting.count}  # fmt: skip
-        reflected = frame.graph.draw("frame/specular", into=reflected, size=frame.size, params=params,
-                                     reflection=body.environment.reflection, **frame.seen("where_seen", "normal", "depth"),
-                                     **frame.light_bindings(body))  # fmt: skip
+        params = {
+            "clip_to_world": frame.view.clip_to_world,
+            "eye": frame.view.eye,
+            "alpha": body.material.roughness**2,
+            "eta": body.material.eta,
+            "lights": frame.lighting.count,
+        }
+        reflected = frame.graph.draw(
+            "frame/specular",
+            into=reflected,
+            size=frame.size,
+            params=params,
+            reflection=body.environment.reflection,
+            **frame.seen("where_seen", "normal", "depth"),
+            **frame.light_bindings(body),
+        )
     return reflected
 
 
@@ -168,10 +215,18 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
     nothing = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
     radiance: Any = None
     for body in frame.stage.bodies:
-        radiance = frame.graph.draw("frame/composite", into=radiance, size=frame.size, surface=body.surface,
-                                    params={"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye},
-                                    rho_dt_table=frame.rho_dt_table(body), M_front=M_front, M_back=M_back or nothing, specular=reflected,
-                                    **frame.seen("where_seen", "normal", "depth"))  # fmt: skip
+        radiance = frame.graph.draw(
+            "frame/composite",
+            into=radiance,
+            size=frame.size,
+            surface=body.surface,
+            params={"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye},
+            rho_dt_table=frame.rho_dt_table(body),
+            M_front=M_front,
+            M_back=M_back or nothing,
+            specular=reflected,
+            **frame.seen("where_seen", "normal", "depth"),
+        )
     return radiance
 
 

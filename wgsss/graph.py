@@ -10,99 +10,19 @@ Declaration order is execution order. A graph is built for one frame and dropped
 from __future__ import annotations
 
 import difflib
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
 
 from wgsss import wgsl
-from wgsss.gpu import FORMATS, Gpu, TextureKey
+from wgsss.gpu import Gpu, TextureKey
+from wgsss.passes import Dispatch, Draw, Encoder, Handle, Pass, Resource, pipeline, view_dimension
 from wgsss.wgsl import Binding, Module, WgslError
 
 Size = int | tuple[int, int] | tuple[int, int, int]
 _UPLOAD_ALIGNMENT = 256  # the largest minimum that WebGPU allows for offsets of uniform and storage bindings
-
-
-@dataclass(eq=False)
-class Resource:
-    """A texture or buffer that passes of one graph write."""
-
-    name: str
-    format: str  # of a texture; empty for a buffer
-    size: tuple[int, int, int]  # width, height, layers; for a buffer (elements, 1, 1)
-    layout: wgsl.Layout | None = None  # of a buffer: its array
-    usage: int = 0
-    version: int = 0
-    drawn: set[int] = field(default_factory=set)  # layers that a raster pass has cleared and drawn
-    gpu: Any = None
-    key: Any = None
-
-    @property
-    def nbytes(self) -> int:
-        if self.layout is not None:
-            return self.size[0] * self.layout.size
-        return TextureKey(self.size, self.format, 0).nbytes
-
-
-@dataclass(frozen=True)
-class Handle:
-    """What a pass wrote: a resource as it is after that pass."""
-
-    resource: Resource
-    version: int
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height in texels."""
-        return self.resource.size[:2]
-
-    @property
-    def format(self) -> str:
-        return self.resource.format
-
-    def layer(self, asked: int) -> int:
-        """The layer that a pass for layer `asked` draws to: the only one, where there are no more."""
-        return asked if self.resource.size[2] > 1 else 0
-
-    def __repr__(self) -> str:
-        return f"{self.resource.name}@{self.version}"
-
-
-@dataclass(eq=False)
-class Pass:
-    """One declared pass. `uploads` holds the packed bytes of arguments that are values, by binding name."""
-
-    name: str
-    module: Module
-    constants: dict[str, float]
-    reads: dict[str, Handle] = field(default_factory=dict)
-    writes: dict[str, Handle] = field(default_factory=dict)
-    imports: dict[str, Any] = field(default_factory=dict)
-    uploads: dict[str, bytes] = field(default_factory=dict)
-    state: Any = None  # _Draw or _Dispatch
-
-
-@dataclass(frozen=True)
-class _Draw:
-    targets: tuple[tuple[str, bool], ...]  # name in `writes`, whether earlier content is kept
-    depth: str | None  # name in `writes` or, where only tested, in `reads`
-    depth_compare: str
-    depth_write: bool
-    keep_depth: bool
-    cull: str
-    layer: int
-    indices: Any
-    count: int
-    instances: int
-
-
-@dataclass(frozen=True)
-class _Dispatch:
-    groups: tuple[int, int, int]
 
 
 class Graph:
@@ -131,7 +51,7 @@ class Graph:
     # declaring
 
     def texture(self, name: str, size: tuple[int, int, int], texture_format: str) -> Handle:
-        """A texture (width, height, layers) that several passes will write in turn, each through `into` or `depth_buffer`."""
+        """A texture (width, height, layers) that several passes will write in turn, by `into` or `depth_buffer`."""
         return Handle(Resource(name, texture_format, size), 0)
 
     def draw(
@@ -141,12 +61,10 @@ class Graph:
         size: tuple[int, int] | None = None,
         indices: Any = None,
         count: int = 3,
-        instances: int = 1,
         into: Handle | Mapping[str, Handle] | None = None,
         depth_buffer: Handle | Literal["new"] | None = None,
         depth_compare: str = "less",
         depth_write: bool = True,
-        cull: str = "none",
         layer: int = 0,
         constants: Mapping[str, float] | None = None,
         label: str = "",
@@ -157,7 +75,7 @@ class Graph:
         Args:
             size: of the targets made, in texels; by default that of `into`, `depth_buffer` or the first texture bound.
             into: targets to draw onto instead of new, cleared ones (a handle, or handles by output name).
-            depth_buffer: "new" for a cleared depth buffer, or the handle of one to test against and, with `depth_write`, write.
+            depth_buffer: "new" for a cleared depth buffer, or one to test against and, with `depth_write`, write.
             layer: of array textures given as `into` or `depth_buffer`.
             bindings: the module's bindings by name: handles, GPU resources that persist, or values to pack and upload.
 
@@ -197,8 +115,7 @@ class Graph:
             handle.resource.drawn.add(handle.layer(layer))
         if indices is not None and count == 3:
             count = indices.size // 4
-        item.state = _Draw(tuple(targets), depth_name, depth_compare, depth_write, keep_depth, cull, layer, indices, count,
-                           instances)  # fmt: skip
+        item.state = Draw(tuple(targets), depth_name, depth_compare, depth_write, keep_depth, layer, indices, count)
         return self._outputs(item)
 
     def dispatch(
@@ -219,7 +136,7 @@ class Graph:
         written = {
             n: b for n, b in loaded.bindings.items() if b.access in ("write", "read_write") and b.space != "sampler"
         }
-        item = self._declare(loaded, label, constants, bindings, made=set(written) - set(bindings))
+        item = self._declare(loaded, label, constants, bindings, made=frozenset(written) - set(bindings))
         if size is None:
             size = self._default_size(
                 [bindings[n] for n in written if isinstance(bindings.get(n), Handle)] or list(item.reads.values()),
@@ -237,10 +154,12 @@ class Graph:
                     resource.size = (extent[0] * extent[1] * extent[2], 1, 1)
                 self._write_new(item, name, resource)
         groups = [-(-n // w) for n, w in zip(extent, loaded.workgroup_size(constants or {}), strict=True)]
-        item.state = _Dispatch((groups[0], groups[1], groups[2]))
+        item.state = Dispatch((groups[0], groups[1], groups[2]))
         return self._outputs(item)
 
-    def _declare(self, module: Module, label: str, constants: Any, bindings: dict[str, Any], made: set[str] = frozenset()) -> Pass:  # type: ignore[assignment] # fmt: skip
+    def _declare(
+        self, module: Module, label: str, constants: Any, bindings: dict[str, Any], made: frozenset[str] = frozenset()
+    ) -> Pass:
         name = f"{module.name} {label}".strip()
         self._names[name] = self._names.get(name, 0) + 1
         item = Pass(name if self._names[name] == 1 else f"{name} #{self._names[name]}", module, dict(constants or {}))
@@ -249,9 +168,8 @@ class Graph:
             raise WgslError(_mismatch(module, wanted, bindings))
         unknown = set(item.constants) - set(module.overrides)
         if unknown:
-            raise WgslError(
-                f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {', '.join(module.overrides)})"
-            )
+            known = ", ".join(module.overrides)
+            raise WgslError(f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {known})")
         for key, value in bindings.items():
             self._bind(item, wanted[key], value)
         self.passes.append(item)
@@ -335,21 +253,22 @@ class Graph:
         arena, arena_key, offsets = self._upload()
         live = 0
         self.peak_bytes = 0
-        timer = _Timer(self, timed)
+        encoder = Encoder(self.gpu, self.ran, timed)
         for i, item in enumerate(self.ran):
             for handle in (*item.reads.values(), *item.writes.values()):
                 if handle.resource.gpu is None:
                     self._allocate(handle.resource)
                     live += handle.resource.nbytes
             self.peak_bytes = max(self.peak_bytes, live)
-            timer.encode(i, item, self._bind_group(item, arena, offsets))
+            encoder.encode(i, item, self._bind_group(item, arena, offsets))
             for handle in {*item.reads.values(), *item.writes.values()}:
                 resource = handle.resource
                 if last_use[resource] == i and resource.gpu is not None and resource not in keep:
                     self.gpu.release(resource.key, resource.gpu)
                     resource.gpu = None
                     live -= resource.nbytes
-        timer.finish()
+        encoder.finish()
+        self.times = encoder.times
         if arena is not None:
             self.gpu.release(arena_key, arena)
         self._held += [r for r in keep if r.gpu is not None and r not in self._held]
@@ -400,7 +319,7 @@ class Graph:
         return arena, key, offsets
 
     def _bind_group(self, item: Pass, arena: Any, offsets: Mapping[tuple[Pass, str], int]) -> tuple[Any, Any]:
-        pipeline, layout = self.gpu.pipeline(*_pipeline(self.gpu, item))
+        state, layout = self.gpu.pipeline(*pipeline(self.gpu, item))
         entries = []
         for name, binding in item.module.bindings.items():
             resource: Any
@@ -412,12 +331,12 @@ class Graph:
                 handle = item.reads.get(name) or item.writes.get(name)
                 resource = handle.resource.gpu if handle else item.imports[name]
                 if binding.space in ("texture", "storage_texture"):
-                    resource = resource.create_view(dimension=_view_dimension(binding.type))
+                    resource = resource.create_view(dimension=view_dimension(binding.type))
                 elif handle:
                     resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
             entries.append({"binding": binding.number, "resource": resource})
         group = self.gpu.device.create_bind_group(layout=layout, entries=entries) if entries else None
-        return pipeline, group
+        return state, group
 
     def __str__(self) -> str:
         rows = [("pass", "reads", "writes", "ms")]
@@ -432,8 +351,10 @@ class Graph:
             for row in rows
         ]
         total = sum(self.times.values())
-        lines.append(f"{len(self.ran)} passes ran, {len(self.culled)} culled; {total:.2f} ms ({self.clock}); "
-                     f"{self.peak_bytes / 2**20:.1f} MiB of transients live at most")  # fmt: skip
+        lines.append(
+            f"{len(self.ran)} passes ran, {len(self.culled)} culled; {total:.2f} ms ({self.clock}); "
+            f"{self.peak_bytes / 2**20:.1f} MiB of transients live at most"
+        )
         return "\n".join(lines)
 
     def dot(self) -> str:
@@ -459,160 +380,4 @@ def _mismatch(module: Module, wanted: Mapping[str, Binding], given: Mapping[str,
     return "; ".join(parts)
 
 
-@lru_cache(maxsize=256)
-def _view_dimension(kind: str) -> str:
-    for suffix, dimension in (("cube_array", "cube-array"), ("cube", "cube"), ("2d_array", "2d-array"), ("3d", "3d")):
-        if kind.split("<")[0].endswith(suffix):
-            return dimension
-    return "2d"
-
-
-def _pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
-    """The key of a pass's pipeline, and the function that makes it."""
-    module, constants = item.module, item.constants
-    key: tuple[Any, ...] = (module.source, tuple(sorted(constants.items())))
-    if isinstance(item.state, _Dispatch):
-
-        def make() -> Any:
-            stage = {"module": gpu.shader(module), "entry_point": module.stages["compute"], "constants": constants}
-            return gpu.device.create_compute_pipeline(layout="auto", compute=stage, label=module.name)
-
-        return key, make
-    state: _Draw = item.state
-    formats = tuple(item.writes[name].format for name, _ in state.targets)
-    depth = (state.depth_compare, state.depth_write) if state.depth else None
-
-    def make() -> Any:
-        stage = {"module": gpu.shader(module), "constants": constants}
-        fragment = (
-            {**stage, "entry_point": module.stages["fragment"], "targets": [{"format": f} for f in formats]}
-            if formats
-            else None
-        )
-        return gpu.device.create_render_pipeline(
-            layout="auto",
-            label=module.name,
-            vertex={**stage, "entry_point": module.stages["vertex"], "buffers": []},
-            primitive={"topology": "triangle-list", "cull_mode": state.cull},
-            depth_stencil={"format": "depth32float", "depth_compare": depth[0], "depth_write_enabled": depth[1]}
-            if depth
-            else None,
-            fragment=fragment,
-        )
-
-    return (*key, formats, depth, state.cull), make
-
-
-class _Timer:
-    """Encodes passes, all into one submission or each fenced on its own, and times them where asked."""
-
-    def __init__(self, graph: Graph, timed: bool) -> None:
-        self.graph, self.gpu = graph, graph.gpu
-        self.stamps = timed and self.gpu.has_timestamps
-        self.walls = timed and not self.stamps
-        self.queries = (
-            self.gpu.device.create_query_set(type="timestamp", count=2 * max(len(graph.ran), 1))
-            if self.stamps
-            else None
-        )
-        self.encoder: Any = None
-        if self.walls:
-            self.gpu.fence()
-
-    def encode(self, i: int, item: Pass, bound: tuple[Any, Any]) -> None:
-        if self.encoder is None:
-            self.encoder = self.gpu.device.create_command_encoder()
-        stamps: dict[str, Any] = {}
-        if self.stamps:
-            stamps = {
-                "timestamp_writes": {
-                    "query_set": self.queries,
-                    "beginning_of_pass_write_index": 2 * i,
-                    "end_of_pass_write_index": 2 * i + 1,
-                }
-            }
-        start = time.perf_counter()
-        for handle in item.writes.values():
-            if handle.version == 1 and handle.resource.layout is not None:  # pooled buffers hold what was there before
-                self.encoder.clear_buffer(handle.resource.gpu)
-        (_encode_dispatch if isinstance(item.state, _Dispatch) else _encode_draw)(self.encoder, item, *bound, stamps)
-        if self.walls:
-            self._submit()
-            self.gpu.fence()
-            self.graph.times[item.name] = 1e3 * (time.perf_counter() - start)
-
-    def _submit(self) -> None:
-        self.gpu.queue.submit([self.encoder.finish()])
-        self.encoder = None
-
-    def finish(self) -> None:
-        import wgpu
-
-        if self.encoder is None:
-            return
-        if not self.stamps:
-            return self._submit()
-        count = 2 * len(self.graph.ran)
-        resolved = self.gpu.device.create_buffer(
-            size=8 * count, usage=wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
-        )
-        self.encoder.resolve_query_set(self.queries, 0, count, resolved, 0)
-        self._submit()
-        ticks = np.frombuffer(self.gpu.queue.read_buffer(resolved), np.uint64).reshape(-1, 2)  # nanoseconds
-        self.graph.times = {
-            p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.graph.ran, ticks, strict=True)
-        }
-
-
-def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
-    compute = encoder.begin_compute_pass(label=item.name, **stamps)
-    compute.set_pipeline(pipeline)
-    compute.set_bind_group(0, group)
-    compute.dispatch_workgroups(*item.state.groups)
-    compute.end()
-
-
-def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
-    state: _Draw = item.state
-
-    def view(handle: Handle) -> Any:
-        return handle.resource.gpu.create_view(
-            dimension="2d", base_array_layer=handle.layer(state.layer), array_layer_count=1
-        )
-
-    colors = [
-        {
-            "view": view(item.writes[name]),
-            "load_op": "load" if kept else "clear",
-            "store_op": "store",
-            "clear_value": (0, 0, 0, 0),
-        }
-        for name, kept in state.targets
-    ]
-    depth = None
-    if state.depth:
-        handle = item.writes.get(state.depth) or item.reads[state.depth]
-        depth = {"view": view(handle)}
-        if state.depth_write:
-            depth |= {
-                "depth_load_op": "load" if state.keep_depth else "clear",
-                "depth_store_op": "store",
-                "depth_clear_value": 1.0,
-            }
-        else:
-            depth |= {"depth_read_only": True}
-    render = encoder.begin_render_pass(
-        color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps
-    )
-    render.set_pipeline(pipeline)
-    if group is not None:
-        render.set_bind_group(0, group)
-    if state.indices is not None:
-        render.set_index_buffer(state.indices, "uint32")
-        render.draw_indexed(state.count, state.instances)
-    else:
-        render.draw(state.count, state.instances)
-    render.end()
-
-
-__all__ = ["FORMATS", "Graph", "Handle", "Pass", "Resource"]
+__all__ = ["Graph", "Handle", "Pass", "Resource"]

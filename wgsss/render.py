@@ -37,7 +37,7 @@ class Image:
         aovs: float32 (H, W, 3) or, for depth, (H, W, 1), by name: `irradiance` (L_d), `M_front` and `M_back` in W/m^2,
             `specular` in W/(m^2 sr), `depth` (distance along the viewing direction, mm; inf where nothing is seen) and
             `normal` (world space).
-        timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run on a device includes its compilation.
+        timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run includes its compilation.
         graph: the frame's graph, for `str` and `dot`.
         metadata: what made the image: method, knobs, adapter, version.
     """
@@ -109,7 +109,7 @@ class Renderer:
         texels = graph.read(handle).astype(np.float32)
         if name != "depth":
             return texels[..., :3]
-        # Clip depth is affine in 1/distance or in distance; the inverse of the projection's lower right corner undoes it.
+        # Clip depth is affine in distance or in 1/distance: the projection's lower right corner, undone.
         projection = frame.view.world_to_clip @ np.linalg.inv(self.stage.scene.camera.view())
         (a, b), (c, d) = projection[2:, 2:]
         with np.errstate(divide="ignore"):

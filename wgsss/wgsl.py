@@ -233,14 +233,17 @@ class Module:
                 continue
             if not re.fullmatch(r"(RGBA|RG|R)\d+(Float|Uint|Unorm|UnormSrgb)", kind):
                 raise WgslError(f"{self.name}: output '{name}: {kind}' does not name a render target's format")
-            found.append((int(re.search(r"@location\((\d+)\)", attributes).group(1)), name,  # type: ignore[union-attr]
-                          kind.lower().replace("srgb", "-srgb")))  # fmt: skip
+            location = attributes.split("@location(")[1].split(")")[0]
+            found.append((int(location), name, kind.lower().replace("srgb", "-srgb")))
         return tuple((name, fmt) for _, name, fmt in sorted(found))
 
     def resolve(self, kind: str) -> str:
         """The type with aliases replaced."""
-        return re.sub(r"\b[A-Za-z_]\w*\b", lambda m: self.resolve(self.aliases[m.group()])
-                      if m.group() in self.aliases else m.group(), kind)  # fmt: skip
+        return re.sub(
+            r"\b[A-Za-z_]\w*\b",
+            lambda m: self.resolve(self.aliases[m.group()]) if m.group() in self.aliases else m.group(),
+            kind,
+        )
 
     def layout(self, kind: str) -> Layout:
         """The layout of a host-shareable type as this module declares it."""
@@ -291,8 +294,8 @@ class Module:
             fields.append((name, layout, offset))
             offset, align = offset + own_size, max(align, own_align)
         size = _round_up(offset, align)
-        dtype = np.dtype({"names": [f[0] for f in fields], "formats": [f[1].dtype for f in fields],
-                          "offsets": [f[2] for f in fields], "itemsize": size})  # type: ignore[call-overload] # fmt: skip
+        names, formats, offsets = [f[0] for f in fields], [f[1].dtype for f in fields], [f[2] for f in fields]
+        dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
         return Layout(kind, size, align, dtype, tuple(fields))
 
     def explain(self, message: str) -> str:

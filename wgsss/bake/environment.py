@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import cached
+from wgsss.bake.cache import KeyPart, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph, Handle
 from wgsss.scene import EnvironmentLight, Material
 
-IRRADIANCE_SIZE = (64, 32)  # the cosine leaves nothing finer: error below 1 % of the mean for a single bright texel
+IRRADIANCE_SIZE = (64, 32)  # the cosine leaves nothing finer
 REFLECTION_SIZE = (128, 64)
 _SOURCE_SIZE = (128, 64)
 _FLOAT16_MAX = 65504.0
@@ -22,7 +22,7 @@ _FLOAT16_MAX = 65504.0
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """Textures over latitude and longitude: L_d in W/m^2 by normal, and mean radiance in W/(m^2 sr) by mirror direction."""
+    """Textures over latitude and longitude: L_d by normal, W/m^2, and mean radiance by mirror direction, W/(m^2 sr)."""
 
     irradiance: Any
     reflection: Any
@@ -46,20 +46,25 @@ def prefilter(gpu: Gpu, lights: Sequence[EnvironmentLight], material: Material) 
         graph = Graph(gpu)
         source = gpu.texture(np.dstack([pixels, np.ones(pixels.shape[:2])]), "rgba32float")
         table = rho_dt_table(graph, material)
-        irradiance = graph.dispatch("frame/prefilter_irradiance", size=(1, 1) if constant else IRRADIANCE_SIZE,
-                                    params={"specular": material.specular}, environment=source, rho_dt_table=table)  # fmt: skip
-        reflection = graph.dispatch("frame/prefilter_reflection", size=(1, 1) if constant else REFLECTION_SIZE,
-                                    params={"alpha": material.roughness**2}, environment=source)  # fmt: skip
+        irradiance = graph.dispatch(
+            "frame/prefilter_irradiance",
+            size=(1, 1) if constant else IRRADIANCE_SIZE,
+            params={"specular": material.specular},
+            environment=source,
+            rho_dt_table=table,
+        )
+        reflection = graph.dispatch(
+            "frame/prefilter_reflection",
+            size=(1, 1) if constant else REFLECTION_SIZE,
+            params={"alpha": material.roughness**2},
+            environment=source,
+        )
         graph.run(irradiance, reflection)
         return {"irradiance": graph.read(irradiance), "reflection": graph.read(reflection)}
 
-    key = [pixels, material.roughness, material.eta, material.specular]
-    maps = cached(
-        "environment",
-        key,
-        make,
-        sources=(__name__, "frame/prefilter_irradiance", "frame/prefilter_reflection", "frame/rho_dt"),
-    )
+    key: list[KeyPart] = [pixels, material.roughness, material.eta, material.specular]
+    code = ("frame/prefilter_irradiance", "frame/prefilter_reflection", "frame/rho_dt")
+    maps = cached("environment", key, make, code=code, label="filtering the environment")
     return Prefiltered(*(gpu.texture(maps[name], "rgba16float") for name in ("irradiance", "reflection")))
 
 
@@ -76,7 +81,7 @@ def _sum(lights: Sequence[EnvironmentLight]) -> npt.NDArray[np.float32]:
     return np.minimum(total, _FLOAT16_MAX)
 
 
-def _reduced(pixels: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _reduced(pixels: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Box-filtered to the source size; smaller images are repeated texel by texel."""
     width, height = _SOURCE_SIZE
     for axis, size in ((0, height), (1, width)):

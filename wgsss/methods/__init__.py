@@ -16,7 +16,7 @@ METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace}
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
     """The method `name` with its knobs set.
 
-    Raises InputError for a name or knob that is not known, or a value that is not a number of the knob's type and range.
+    Raises InputError for a name or knob that is not known, or a value that is not of the knob's type and range.
     """
     if name not in METHODS:
         raise unknown("method", name, METHODS)

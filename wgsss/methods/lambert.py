@@ -25,6 +25,13 @@ class Lambert:
         irradiance = shared.irradiance_pixels(frame)
         M_front: Any = None
         for body in frame.stage.bodies:
-            M_front = frame.graph.draw("lambert/reflect", into=M_front, size=frame.size, params={"total": body.material.profile.total},
-                                       surface=body.surface, irradiance=irradiance, **frame.seen("where_seen", "base_color"))  # fmt: skip
+            M_front = frame.graph.draw(
+                "lambert/reflect",
+                into=M_front,
+                size=frame.size,
+                params={"total": body.material.profile.total},
+                surface=body.surface,
+                irradiance=irradiance,
+                **frame.seen("where_seen", "base_color"),
+            )
         return Diffused(M_front, irradiance=irradiance)

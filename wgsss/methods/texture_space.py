@@ -1,4 +1,4 @@
-"""deon07's surface: diffusion in texture space by a sum of Gaussians (d'Eon & Luebke 2007; Mikkelsen 2009, section 3.4).
+"""deon07's surface: texture-space diffusion by a sum of Gaussians (d'Eon & Luebke 2007; Mikkelsen 2009, 3.4).
 
 The irradiance is drawn over the object's atlas, dilated across chart borders, and blurred by ever wider Gaussians, each
 starting from the last result, since the variances of successive Gaussians add up.
@@ -68,15 +68,22 @@ class TextureSpace:
             blurred = blurs(frame.graph, irradiance, atlas, profile)
             weights = np.zeros((_SLOTS, 4))
             weights[: len(blurred), :3] = profile.weights
-            maps = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
-            M_front = frame.graph.draw("texture_space/gather", into=M_front, size=frame.size, params={"weights": weights},
-                                       surface=body.surface, **maps, **frame.seen("where_seen", "base_color"))  # fmt: skip
+            maps: dict[str, Any] = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
+            M_front = frame.graph.draw(
+                "texture_space/gather",
+                into=M_front,
+                size=frame.size,
+                params={"weights": weights},
+                surface=body.surface,
+                **maps,
+                **frame.seen("where_seen", "base_color"),
+            )
         return Diffused(M_front)
 
 
 def blurs(graph: Graph, irradiance: Handle, atlas: Charts, profile: SumOfGaussians) -> list[Handle]:
     """The irradiance map blurred by each Gaussian of the profile, narrowest first."""
-    seams = {"ids": atlas.ids, "seams": atlas.seams}
+    seams: dict[str, Any] = {"ids": atlas.ids, "seams": atlas.seams}
     blurred = graph.draw("texture_space/dilate", source=irradiance, size=irradiance.size, **seams)
     found, reached = [], 0.0
     for k, variance in enumerate(profile.variances):
@@ -87,8 +94,15 @@ def blurs(graph: Graph, irradiance: Handle, atlas: Charts, profile: SumOfGaussia
                 "sigma": np.sqrt(variance - reached),
                 "smooth_to": np.sqrt(reached),
             }
-            blurred = graph.draw("texture_space/blur", source=blurred, gradient_u=atlas.gradient_u, gradient_v=atlas.gradient_v,
-                                 params=params, label=f"{variance:.3g} mm2 {'uv'[direction]}", **seams)  # fmt: skip
+            blurred = graph.draw(
+                "texture_space/blur",
+                source=blurred,
+                gradient_u=atlas.gradient_u,
+                gradient_v=atlas.gradient_v,
+                params=params,
+                label=f"{variance:.3g} mm2 {'uv'[direction]}",
+                **seams,
+            )
         reached = float(variance)
         found.append(blurred)
     return found
