@@ -9,7 +9,7 @@ from wgsss.errors import InputError
 from wgsss.optics import SKIN_GAUSSIANS, Dipole
 from wgsss.scene import MATERIALS, Maps, Material, material
 
-# Jensen et al. 2001, figure 5: sigma_s' and sigma_a in 1/mm, and the total diffuse reflectance they give in closed form.
+# Jensen et al. 2001, figure 5: sigma_s' and sigma_a in 1/mm, and the total diffuse reflectance in closed form.
 JENSEN = {
     "apple": ((2.29, 2.39, 1.97), (0.003, 0.0034, 0.046), (0.8464, 0.8407, 0.5279)),
     "chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19), (0.3137, 0.1558, 0.1264)),

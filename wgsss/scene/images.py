@@ -135,7 +135,7 @@ def _decode_rgbe(data: bytes, height: int, width: int) -> Array:
     try:
         for row in range(height):
             if data[at : at + 4] != b"\2\2" + width.to_bytes(2, "big"):
-                raise InputError(f"damaged in row {row} of {height}")
+                raise IndexError
             at += 4
             line = bytearray()
             while len(line) < 4 * width:

@@ -134,7 +134,7 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
     positions that are not finite, and for a scale that is not positive.
     """
     from wgsss.scene.meshfile import MM_PER_UNIT, read_triangles
-    from wgsss.scene.repair import repair
+    from wgsss.scene.repair import counted, repair
 
     path = Path(path)
     for name, value in (("mm_per_unit", mm_per_unit), ("size_mm", size_mm)):
@@ -157,7 +157,7 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
         raise InputError(f"{path}: the mesh has no area: all {len(file.faces)} faces are degenerate")
     notes = [*fixed.notes, *file.notes]
     if fixed.welded and not file.splits:
-        notes.insert(0, f"{fixed.welded} duplicate vertices welded")
+        notes.insert(0, f"{counted(fixed.welded, 'duplicate vertex')} welded")
     if notes:
         warnings.warn(f"{path.name}: {'; '.join(notes)}", stacklevel=2)
 

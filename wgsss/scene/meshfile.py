@@ -52,7 +52,9 @@ def read_triangles(path: Path) -> Triangles:
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: not a mesh format that can be read ({' '.join(SUFFIXES)})")
     require_file(path)
-    parts = list(_parts(path))
+    parts = _parts(path)
+    if sum(len(mesh.faces) for mesh, _ in parts) < _declared_faces(path):
+        raise InputError(f"{path}: damaged: it holds fewer faces than it says")
     if not parts:
         raise InputError(f"{path}: the mesh is empty: it has no faces")
 
@@ -97,7 +99,8 @@ def read_triangles(path: Path) -> Triangles:
 def _transform(vectors: Array, linear: Array) -> Array:
     """Each row times the matrix. In plain sums: BLAS may round equal rows differently, which would open seams."""
     x, y, z = vectors.T
-    return np.stack([x * row[0] + y * row[1] + z * row[2] for row in linear], axis=1)
+    with np.errstate(all="ignore"):  # positions that are not finite are the caller's to find
+        return np.stack([x * row[0] + y * row[1] + z * row[2] for row in linear], axis=1)
 
 
 def _parts(path: Path) -> list[tuple[Any, Array]]:
@@ -114,6 +117,17 @@ def _parts(path: Path) -> list[tuple[Any, Array]]:
     except Exception as error:  # its readers let every kind of exception through
         reason = " ".join(str(error).split()) if isinstance(error, ValueError | NotImplementedError) else ""
         raise InputError(f"{path}: damaged, or not a {suffix} file{f' ({reason[:100]})' if reason else ''}") from None
+
+
+def _declared_faces(path: Path) -> int:
+    """How many faces a file says it has, where trimesh does not look whether they came."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    found = {
+        ".ply": re.search(rb"^element face (\d+)", head, re.MULTILINE),
+        ".off": re.search(rb"^\d+\s+(\d+)", re.sub(rb"#[^\n]*|C?OFF", b"", head).lstrip()),
+    }.get(path.suffix.lower())
+    return int(found[1]) if found else 0
 
 
 def _options(path: Path) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def repair(positions: Array, faces: Array) -> Repaired:
         faces = np.where(flipped[:, None], faces[:, ::-1], faces)
         _note(notes, int(flipped.sum()), "face", "wound inwards, turned over")
         edges = _Edges(faces) if flipped.any() else edges
-        _note(notes, len(edges.boundary), "boundary edge", f"({_count(edges.holes(), 'hole')})")
+        _note(notes, len(edges.boundary), "boundary edge", f"({counted(edges.holes(), 'hole')})")
         _note(notes, edges.branching, "edge", "of more than two faces")
         _note(notes, int((~edges.agree).sum()), "edge", "whose faces disagree on the outside")
 
@@ -153,7 +153,9 @@ def _disagreeing(edges: _Edges, positions: Array, faces: Array) -> Array:
     ).reshape(2, count)
     area = np.linalg.norm(_area_vectors(positions, faces), axis=1)
     for_it = np.bincount(as_is, area, 2 * count)
-    minority: Array = (as_is != turned) & (for_it[as_is] < for_it[turned])
+    # Of two halves alike either will do, so long as they agree.
+    tied = (for_it[as_is] == for_it[turned]) & (as_is > turned)
+    minority: Array = (as_is != turned) & ((for_it[as_is] < for_it[turned]) | tied)
     return minority
 
 
@@ -191,10 +193,11 @@ def _area_vectors(positions: Array, faces: Array) -> Array:
 
 def _note(notes: list[str], count: int, what: str, did: str) -> None:
     if count:
-        notes.append(f"{_count(count, what)} {did}")
+        notes.append(f"{counted(count, what)} {did}")
 
 
-def _count(count: int, what: str) -> str:
+def counted(count: int, what: str) -> str:
+    """ "1 vertex", "2 vertices"."""
     if count == 1:
         return f"1 {what}"
     return f"{count} {what.removesuffix('ex')}{'ices' if what.endswith('ex') else 's'}"

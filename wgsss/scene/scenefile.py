@@ -5,12 +5,14 @@ fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or t
 of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm`) or a `shape` (with the arguments of that
 function in `shapes`), and a `material`: a name, a material file, or a table `[object.material]`. Such a table or file
 holds the fields of Material, may start from a `preset`, and names images as `base_color_map`, `normal_map` and
-`specular_map`. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
+`specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake case. Paths are relative to the file
+they stand in. What is left out has the defaults of a mesh file.
 """
 
 from __future__ import annotations
 
 import inspect
+import re
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
@@ -91,7 +93,8 @@ def _shapes() -> dict[str, Any]:
 def _motions() -> dict[str, Any]:
     from wgsss.scene import motion
 
-    return {name.lower(): c for name, c in vars(motion).items() if is_dataclass(c) and not name.startswith("_")}
+    classes = {name: c for name, c in vars(motion).items() if is_dataclass(c) and not name.startswith("_")}
+    return {re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): c for name, c in classes.items()}
 
 
 def _light(table: Table, where: str, folder: Path) -> Any:
