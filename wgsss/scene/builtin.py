@@ -100,8 +100,8 @@ def wave(vertices: int | None = None) -> Scene:
 
 def crowd(vertices: int | None = None, copies: int = 4) -> Scene:
     """1 to 16 heads of skin that share one mesh, in rows"""
-    if not 1 <= copies <= 16:
-        raise InputError(f"crowd: copies must be between 1 and 16, got {copies}")
+    if not isinstance(copies, int) or not 1 <= copies <= 16:
+        raise InputError(f"crowd: copies must be a whole number from 1 to 16, not {copies!r}")
     mesh, skin = shapes.head(vertices), material("skin")
     columns = math.ceil(math.sqrt(copies))
     rows = math.ceil(copies / columns)

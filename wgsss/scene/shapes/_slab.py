@@ -20,11 +20,11 @@ def slab(size: tuple[float, float, float] = (40.0, 40.0, 4.0), vertices: int | N
     """A box of `size` (x, y, z) mm about the origin with flat corner normals and one chart per side.
 
     Positions are welded over the edges; all six charts have the same scale, upright as seen from outside, and lie apart
-    by gutters. Vertices: 26 to 1000000, by default 6000. Raises InputError for another count or a size not above zero.
+    by gutters. Vertices: 100 to 1000000, by default 6000. Raises InputError for another count or a size not above zero.
     """
     if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
         raise InputError(f"slab: size must be three lengths above 0 mm, got {tuple(size)}")
-    wanted = vertex_count("slab", vertices, 6000, 26, 1_000_000)
+    wanted = vertex_count("slab", vertices, 6000, 100, 1_000_000)
 
     def cells_at(spacing: float) -> np.ndarray:
         return np.maximum(np.round(np.array(size) / spacing), 1).astype(int)
@@ -33,7 +33,6 @@ def slab(size: tuple[float, float, float] = (40.0, 40.0, 4.0), vertices: int | N
         x, y, z = (int(n) for n in cells_at(spacing))
         return 2 * (x * y + y * z + z * x) + 2
 
-    # The widest grid that fits the count can be coarser than any side only for tiny counts, where one cell is left.
     cells = cells_at(fit_spacing(count, wanted))
     origins, scale = _charts(size)
 
