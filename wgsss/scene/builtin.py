@@ -35,8 +35,8 @@ _MARGIN = 1.08
 def slab(vertices: int | None = None) -> Scene:
     """a flat plate of marble with hard edges, lit from one side"""
     plate = Object(shapes.slab(vertices=vertices), material("marble"))
-    light = DirectionalLight(direction=(0.55, -0.35, -0.76), irradiance=(3.2, 3.1, 3.0))
-    return Scene("slab", (plate,), (light,), _framing([plate], azimuth=32, elevation=14))
+    light = DirectionalLight(direction=(0.75, -0.2, -0.63), irradiance=(4.2, 4.1, 4.0))
+    return Scene("slab", (plate,), (light,), _framing([plate], azimuth=52, elevation=16))
 
 
 def sphere(vertices: int | None = None) -> Scene:
@@ -67,8 +67,8 @@ def gyroid(vertices: int | None = None) -> Scene:
     """a thin marble gyroid full of its own shadows, between a green and a pink light"""
     shell = Object(shapes.gyroid(vertices), material("marble"))
     green = PointLight((-150, 60, 60), intensity=(0.015, 0.105, 0.030))
-    pink = PointLight((130, 70, -70), intensity=(0.120, 0.030, 0.075))
-    room = EnvironmentLight((0.12, 0.12, 0.13))
+    pink = PointLight((140, 60, 10), intensity=(0.120, 0.030, 0.075))
+    room = EnvironmentLight((0.08, 0.08, 0.09))
     return Scene("gyroid", (shell,), (green, pink, room), _framing([shell], azimuth=24, elevation=18))
 
 
