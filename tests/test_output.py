@@ -1,0 +1,156 @@
+"""Files: what they hold, that nothing is half-written, that what cannot be written is told beforehand."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image as Picture
+
+from wgsss.errors import InputError
+from wgsss.output import check_output, replacing, save, save_frames
+from wgsss.render import Image, RenderError
+
+WIDTH, HEIGHT = 7, 5  # odd, and not square
+
+
+@pytest.fixture
+def image() -> Image:
+    random = np.random.default_rng(1)
+    pixels = random.random((HEIGHT, WIDTH, 4), np.float32) * 9
+    pixels[..., 3] = 1
+    pixels[0] = 0  # a row in which nothing is seen
+    display = (random.random((HEIGHT, WIDTH, 4)) * 255).astype(np.uint8)
+    display[..., 3] = 255 * pixels[..., 3]
+    depth = random.random((HEIGHT, WIDTH, 1), np.float32)
+    depth[0] = np.inf
+    aovs = {"irradiance": random.random((HEIGHT, WIDTH, 3), np.float32), "depth": depth, "normal": pixels[..., :3] / 9}
+    graph: Any = None
+    return Image(pixels, display, aovs, {}, "", graph, {"method": "deon07", "adapter": "a driver"})
+
+
+def test_png_is_what_a_display_shows(image: Image, tmp_path: Path) -> None:
+    assert save(image, tmp_path / "a.png") == [tmp_path / "a.png"]
+    with Picture.open(tmp_path / "a.png") as picture:
+        np.testing.assert_array_equal(np.asarray(picture), image.display)
+        assert picture.text["wgsss.adapter"] == "a driver"  # type: ignore[attr-defined]
+
+
+def test_exr_holds_linear_channels_layers_and_metadata(image: Image, tmp_path: Path) -> None:
+    save(image, tmp_path / "a.exr")
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        found = {name: channel.pixels for name, channel in file.channels().items()}
+        header = dict(file.header())
+    wanted = {
+        "R",
+        "G",
+        "B",
+        "A",
+        "irradiance.R",
+        "irradiance.G",
+        "irradiance.B",
+        "depth.Z",
+        "normal.X",
+        "normal.Y",
+        "normal.Z",
+    }
+    assert set(found) == wanted
+    for i, name in enumerate("RGBA"):
+        assert found[name].dtype == np.float32
+        np.testing.assert_array_equal(found[name], image.pixels[..., i])
+    np.testing.assert_array_equal(found["normal.Y"], image.aovs["normal"][..., 1])
+    assert found["depth.Z"][0].tolist() == [0] * WIDTH  # nothing seen: coverage tells, and infinity never gets out
+    np.testing.assert_array_equal(found["depth.Z"][1:], image.aovs["depth"][1:, :, 0])
+    assert header["wgsss.method"] == "deon07"
+
+
+def test_npy_holds_linear_pixels_with_the_extra_outputs_beside(image: Image, tmp_path: Path) -> None:
+    written = save(image, tmp_path / "a.npy")
+    assert written == [tmp_path / name for name in ("a.npy", "a.irradiance.npy", "a.depth.npy", "a.normal.npy")]
+    assert set(tmp_path.iterdir()) == set(written)
+    np.testing.assert_array_equal(np.load(tmp_path / "a.npy"), image.pixels)
+    np.testing.assert_array_equal(np.load(tmp_path / "a.irradiance.npy"), image.aovs["irradiance"])
+    assert np.isfinite(np.load(tmp_path / "a.depth.npy")).all()
+
+
+def test_film_has_even_sides_the_colours_of_the_display_and_black_where_nothing_is_seen(
+    image: Image, tmp_path: Path
+) -> None:
+    display = np.full((HEIGHT, WIDTH, 4), (200, 90, 40, 255), np.uint8)
+    display[:, 4:, 3] = 0
+    frame = replace(image, display=display)
+    save_frames([frame] * 3, tmp_path / "a.mp4", fps=10)
+    frames = imageio_ffmpeg.read_frames(tmp_path / "a.mp4")
+    about = next(frames)
+    assert (about["size"], about["fps"], about["pix_fmt"].split("(")[0]) == ((8, 6), 10, "yuv420p")
+    pictures = [np.frombuffer(frame, np.uint8).reshape(6, 8, 3) for frame in frames]
+    assert len(pictures) == 3
+    for picture in pictures:
+        assert np.abs(picture[1:4, 1].astype(int) - (200, 90, 40)).max() <= 6, picture[2, 1]
+        assert picture[1:4, 7].max() <= 6
+
+
+def test_frames_are_numbered_from_one(image: Image, tmp_path: Path) -> None:
+    written = save_frames([image] * 2, tmp_path / "a.png")
+    assert [path.name for path in written] == ["a.0001.png", "a.0002.png"]
+    assert set(tmp_path.iterdir()) == set(written)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.npy", "a.mp4"])
+@pytest.mark.parametrize("where", ["pixels", "aovs"])
+def test_numbers_that_are_not_finite_are_never_written(image: Image, tmp_path: Path, name: str, where: str) -> None:
+    (image.pixels if where == "pixels" else image.aovs["irradiance"])[2, 3, 1] = np.nan
+    (tmp_path / name).write_text("before")
+    with pytest.raises(RenderError, match="not finite"):
+        save(image, tmp_path / name)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
+
+
+def test_what_fails_on_the_way_leaves_the_old_files(tmp_path: Path) -> None:
+    paths = [tmp_path / "a", tmp_path / "b"]
+    paths[0].write_text("before")
+    with pytest.raises(InputError, match="cannot be written"), replacing(*paths) as (one, two):
+        one.write_text("after")
+        two.touch()
+        raise OSError(28, "No space left on device")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
+
+
+def test_a_film_that_fails_on_the_way_is_not_there(image: Image, tmp_path: Path) -> None:
+    def frames() -> Any:
+        yield image
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        save_frames(frames(), tmp_path / "a.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("a.jpg", r"a\.jpg: the output must end in \.png or \.exr or \.npy or \.mp4"),
+        ("a", "must end in"),
+        ("folder.png", "is a folder"),
+        ("nowhere/a.png", "there is no folder '.*nowhere'"),
+        ("a" * 300 + ".png", "cannot be written"),
+        ("/proc/a.png", "/proc/a.png: cannot be written"),
+    ],
+)
+def test_places_that_cannot_be_written_are_told_beforehand(tmp_path: Path, path: str, said: str) -> None:
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(InputError, match=said):
+        check_output(tmp_path / path)
+    assert [found.name for found in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_files_have_the_permissions_of_any_new_file(image: Image, tmp_path: Path) -> None:
+    save(image, tmp_path / "a.png")
+    subprocess.run(["touch", tmp_path / "b"], check=True)
+    assert (tmp_path / "a.png").stat().st_mode == (tmp_path / "b").stat().st_mode

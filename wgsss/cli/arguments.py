@@ -1,0 +1,123 @@
+"""What several commands take, and how they say what they did."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from wgsss.errors import InputError
+
+if TYPE_CHECKING:
+    from wgsss.methods import Method
+    from wgsss.scene import Scene
+
+DEFAULT_METHOD = "deon07"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are ours: one line."""
+
+    def __init__(self, **rest: Any) -> None:
+        super().__init__(**rest, allow_abbrev=False)
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see '{self.prog} --help')")
+
+    @property
+    def options(self) -> list[str]:
+        """The long options there are."""
+        return [name for action in self._actions for name in action.option_strings if name.startswith("--")]
+
+
+def command(commands: Any, name: str, run: Any, summary: str, **rest: Any) -> Parser:
+    """Declare a command; `run` is called with its arguments."""
+    parser: Parser = commands.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.", **rest)
+    parser.set_defaults(run=run)
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    return parser
+
+
+def add_scene(parser: Parser) -> None:
+    """The scene, and the choices that go with it."""
+    add = parser.add_argument
+    add("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a mesh file (see 'wgsss scenes')")
+    add("--material", metavar="NAME", help="of all objects: a measured material or a material file (.toml)")
+    add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
+    add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
+
+
+def add_method(parser: Parser) -> None:
+    """The method, and its knobs."""
+    add = parser.add_argument
+    add("--method", metavar="NAME", default=DEFAULT_METHOD, help="default: %(default)s (see 'wgsss methods')")
+    add("--set", metavar="KNOB=VALUE", dest="knobs", type=assignment, action="append", default=[], help="set a knob")
+
+
+def load_scene(args: argparse.Namespace) -> Scene:
+    """The scene that the arguments name."""
+    from wgsss.scene import load_scene
+
+    return load_scene(args.scene, material=args.material, size_mm=args.size_mm, vertices=args.vertices)
+
+
+def make_method(args: argparse.Namespace) -> Method:
+    """The method that the arguments name, its knobs set."""
+    from wgsss.methods import make_method
+
+    return make_method(args.method, dict(args.knobs))
+
+
+def tell(args: argparse.Namespace, result: Any, text: str) -> None:
+    """Print a command's result: as JSON where that was asked for, else as text."""
+    print(json.dumps(result, indent=2, ensure_ascii=False) if args.json else text)
+
+
+def table(rows: list[list[str]]) -> str:
+    """Rows of text in columns, one row a line."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def size(text: str) -> tuple[int, int]:
+    """WIDTHxHEIGHT in pixels."""
+    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT, such as 512x512")
+    return int(match[1]), int(match[2])
+
+
+def count(text: str) -> int:
+    """A whole number above 0."""
+    if not re.fullmatch(r"\d{1,9}", text) or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+    return int(text)
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
+def assignment(text: str) -> tuple[str, str]:
+    """KNOB=VALUE."""
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not KNOB=VALUE, such as map_size=512")
+    return name, value

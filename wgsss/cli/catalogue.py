@@ -1,0 +1,67 @@
+"""`wgsss scenes`, `methods` and `materials`: what there is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wgsss.cli import arguments
+
+
+def declare(commands: Any) -> None:
+    arguments.command(commands, "scenes", scenes, "list the built-in scenes")
+    arguments.command(commands, "methods", methods, "list the methods, their sources and their knobs")
+    arguments.command(commands, "materials", materials, "list the measured materials")
+
+
+def scenes(args: Any) -> None:
+    from wgsss.scene.builtin import SCENES
+
+    found = [{"name": name, "about": (make.__doc__ or "").strip().split("\n")[0]} for name, make in SCENES.items()]
+    arguments.tell(args, {"scenes": found}, arguments.table([[s["name"], s["about"]] for s in found]))
+
+
+def methods(args: Any) -> None:
+    from wgsss.methods import METHODS
+
+    found: list[dict[str, Any]] = [
+        {"name": name, "source": kind.source, "knobs": _knobs(kind)} for name, kind in METHODS.items()
+    ]
+    rows: list[list[str]] = []
+    for method in found:
+        rows.append([method["name"], method["source"]])
+        for knob in method["knobs"]:
+            low, high = knob["range"]
+            unit = f" {knob['unit']}" if knob["unit"] else ""
+            rows.append(["", f"--set {knob['name']}={knob['default']}  {knob['help']}, {low:g} to {high:g}{unit}"])
+    arguments.tell(args, {"methods": found}, arguments.table(rows))
+
+
+def _knobs(kind: Any) -> list[dict[str, Any]]:
+    from dataclasses import fields
+
+    return [{"name": knob.name, "default": knob.default, **knob.metadata} for knob in fields(kind)]
+
+
+def materials(args: Any) -> None:
+    from wgsss.scene import MATERIALS
+
+    found = []
+    for name, medium in MATERIALS.items():
+        entry: dict[str, Any] = {"name": name, "eta": medium.eta, "base_color": medium.base_color}
+        if medium.gaussians is None:
+            entry |= {"sigma_s_prime": medium.sigma_s_prime, "sigma_a": medium.sigma_a}
+        else:
+            entry |= {"variances": medium.gaussians.variances.tolist(), "weights": medium.gaussians.weights.tolist()}
+        found.append(entry)
+    rows = [[m["name"], _medium(m), f"eta {m['eta']:g}"] for m in found]
+    arguments.tell(args, {"materials": found}, arguments.table(rows))
+
+
+def _medium(entry: dict[str, Any]) -> str:
+    if "sigma_a" not in entry:
+        return f"{len(entry['variances'])} Gaussians, variances {_numbers(entry['variances'])} mm^2"
+    return f"sigma_s' {_numbers(entry['sigma_s_prime'])}, sigma_a {_numbers(entry['sigma_a'])} 1/mm"
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(f"{v:.3g}" for v in values)

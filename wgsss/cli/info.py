@@ -1,0 +1,65 @@
+"""`wgsss info`: what to paste in a bug report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wgsss.cli import arguments
+from wgsss.errors import InputError
+
+_PACKAGES = ("wgpu", "numpy", "scipy", "trimesh", "xatlas", "OpenEXR")
+
+
+def declare(commands: Any) -> None:
+    arguments.command(commands, "info", run, "list adapters, limits and versions, for a bug report")
+
+
+def run(args: Any) -> None:
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    from wgsss import __version__
+    from wgsss.bake import cache
+    from wgsss.gpu import LIMITS, adapters, default_gpu
+
+    versions = {"wgsss": __version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "missing"
+    found = [{key: a.info[key] for key in ("device", "adapter_type", "description", "vendor")} for a in adapters()]
+    files = [file.stat().st_size for file in cache.folder().glob("*.npz")]
+    result: dict[str, Any] = {
+        "versions": versions,
+        "platform": platform.platform(),
+        "adapters": found,
+        "chosen": None,
+        "cache": {"folder": str(cache.folder()), "entries": len(files), "bytes": sum(files)},
+    }
+    failure: InputError | None = None
+    try:
+        gpu = default_gpu()
+        result["chosen"] = gpu.name
+        result["clock"] = "gpu timestamps" if gpu.has_timestamps else "fenced wall clock"
+        result["limits"] = {
+            name: {"asked": asked, "adapter": gpu.adapter.limits[name]} for name, asked in LIMITS.items()
+        }
+    except InputError as error:  # what is known helps all the same
+        failure = error
+    arguments.tell(args, result, _text(result))
+    if failure:
+        raise failure
+
+
+def _text(result: dict[str, Any]) -> str:
+    cache = result["cache"]
+    rows = [[name, text] for name, text in result["versions"].items()]
+    rows.append(["platform", result["platform"]])
+    rows += [["adapter", f"{a['device']} ({a['adapter_type']}), {a['description']}"] for a in result["adapters"]]
+    rows.append(["chosen", result["chosen"] or "none"])
+    if "clock" in result:
+        rows.append(["clock", result["clock"]])
+    rows.append(["cache", f"{cache['folder']}: {cache['entries']} entries, {cache['bytes'] / 1e6:.1f} MB"])
+    rows += [[name, f"{n['asked']} (adapter: {n['adapter']})"] for name, n in result.get("limits", {}).items()]
+    return arguments.table(rows)

@@ -1,0 +1,107 @@
+"""`wgsss render`: a scene to a picture."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wgsss.cli import arguments
+
+if TYPE_CHECKING:
+    from wgsss.graph import Graph
+    from wgsss.render import Image, Renderer
+
+_OUTPUT = """.png or .mp4, tone mapped; .exr or .npy, linear, with all extra outputs (default: SCENE.png). Several
+frames become one .mp4, or files with numbers"""
+_GRAPH = """print the passes that ran and those culled, with ms and bytes, of one more frame (the first one pays for
+compilation)"""
+
+
+def declare(commands: Any) -> None:
+    parser = arguments.command(commands, "render", run, "render a scene to a picture")
+    arguments.add_scene(parser)
+    arguments.add_method(parser)
+    add = parser.add_argument
+    add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
+    add("--frames", metavar="N", type=arguments.count, default=1, help="render N frames (default: 1)")
+    add("--fps", metavar="F", type=arguments.positive, default=25.0, help="frames per second (default: 25)")
+    add("--time", metavar="S", type=arguments.number, default=0.0, help="of the first frame, seconds (default: 0)")
+    add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
+    add("--tone-map", metavar="NAME", help="none, reinhard or aces, instead of the scene's own")
+    add("-o", "--output", metavar="FILE", type=Path, help=_OUTPUT)
+    add("--graph", action="store_true", help=_GRAPH)
+    add("--graph-out", metavar="FILE.dot", type=Path, help="write that frame's graph for Graphviz")
+
+
+def run(args: Any) -> None:
+    from dataclasses import replace
+
+    from wgsss.output import check_output, replacing, save, save_frames
+    from wgsss.render import Renderer
+
+    path = check_output(args.output or Path(f"{Path(args.scene).stem}.png"))
+    dot = args.graph_out and check_output(args.graph_out, (".dot",))
+    method = arguments.make_method(args)
+    scene = arguments.load_scene(args)
+    own = {"exposure": args.exposure, "tone_map": args.tone_map}
+    scene = replace(scene, **{key: value for key, value in own.items() if value is not None})
+
+    start = time.perf_counter()
+    renderer = Renderer(scene, method, args.size)
+    ready = time.perf_counter()
+    frames = _frames(renderer, args, path)
+    written = save(next(frames), path) if args.frames == 1 else save_frames(frames, path, args.fps)
+    done = time.perf_counter()
+
+    result: dict[str, Any] = {
+        "files": [str(file) for file in written],
+        "scene": scene.name,
+        "method": args.method,
+        "knobs": {knob: getattr(method, knob) for knob, _ in args.knobs},
+        "size": args.size,
+        "frames": args.frames,
+        "adapter": renderer.gpu.name,
+        "seconds": {"prepare": round(ready - start, 3), "frames": round(done - ready, 3)},
+    }
+    files = str(written[0]) if len(written) == 1 else f"{written[0]} … {written[-1].name}"
+    lines = [f"{files}: {scene.name} by {args.method}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
+    if args.graph or dot:
+        graph = renderer.frame(_times(args)[-1], timed=True).graph
+        if dot:
+            with replacing(dot) as (file,):
+                file.write_text(graph.dot())
+            result["graph_file"] = str(dot)
+        if args.graph:
+            result["graph"] = _described(graph)
+            lines.append(str(graph))
+    arguments.tell(args, result, "\n".join(lines))
+
+
+def _times(args: Any) -> list[float]:
+    return [args.time + i / args.fps for i in range(args.frames)]
+
+
+def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
+    from wgsss.output import LINEAR_FORMATS
+    from wgsss.render import AOVS
+
+    aovs = AOVS if path.suffix.lower() in LINEAR_FORMATS else ()
+    times: Any = _times(args)
+    if len(times) > 1:
+        from tqdm import tqdm
+
+        times = tqdm(times, desc=path.name, unit="frame", file=sys.stderr, disable=None)  # None: only on a terminal
+    for time_s in times:
+        yield renderer.frame(time_s, aovs, timed=False)
+
+
+def _described(graph: Graph) -> dict[str, Any]:
+    passes = []
+    for item in graph.passes:
+        writes = {n: {"size": h.resource.size, "format": h.format or "buffer"} for n, h in item.writes.items()}
+        ms, culled = graph.times.get(item.name), item in graph.culled
+        passes.append({"pass": item.name, "culled": culled, "ms": ms, "reads": sorted(item.reads), "writes": writes})
+    return {"clock": graph.clock, "peak_bytes": graph.peak_bytes, "passes": passes}
