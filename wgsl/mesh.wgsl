@@ -29,12 +29,18 @@ fn bent_normal(n: Direction, x: Position, uv: vec2f, texel: vec3f) -> Direction 
     let duvdy = dpdy(uv);
     let t_u = cross(dy, n) * duvdx.x + cross(n, dx) * duvdy.x;
     let t_v = cross(dy, n) * duvdx.y + cross(n, dx) * duvdy.y;
-    let scale = inverseSqrt(max(max(dot(t_u, t_u), dot(t_v, t_v)), 1e-30));
-    let m = texel * 2.0 - 1.0; // green points up, v down
+    let turned = select(-1.0, 1.0, dot(cross(dx, dy), n) > 0.0); // whether x and y run as they do on the outside
+    let scale = turned * inverseSqrt(max(max(dot(t_u, t_u), dot(t_v, t_v)), 1e-30));
+    let m = (texel * 255.0 - 128.0) / 127.0; // a byte of 128 is no slope; green points up, v down
     return normalize(t_u * (scale * m.x) - t_v * (scale * m.y) + n * max(m.z, 1e-3));
 }
 
-// Base colour split into the parts before and after diffusion: col(x_i)^(1-a) and col(x_o)^a (Mikkelsen 2009, 3.5).
-fn color_part(color: vec3f, share: Number) -> vec3f {
-    return pow(max(color, vec3f(1e-6)), vec3f(share));
+// The base colour's share before diffusion, col(x_i)^(1-a) (Mikkelsen 2009, 3.5). `texel` is the map's sample.
+fn color_before(surface: Surface, texel: vec3f) -> vec3f {
+    return pow(max(surface.base_color * texel, vec3f(1e-6)), vec3f(1.0 - surface.color_after));
+}
+
+// The base colour's share after diffusion, col(x_o)^a.
+fn color_after(surface: Surface, texel: vec3f) -> vec3f {
+    return pow(max(surface.base_color * texel, vec3f(1e-6)), vec3f(surface.color_after));
 }

@@ -10,6 +10,7 @@ Declaration order is execution order. A graph is built for one frame and dropped
 from __future__ import annotations
 
 import difflib
+import weakref
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -42,11 +43,8 @@ class Graph:
         self.peak_bytes = 0
         self.uploaded_bytes = 0
         self._names: dict[str, int] = {}
-        self._held: list[Resource] = []
-
-    def __del__(self) -> None:
-        for resource in self._held:
-            self.gpu.release(resource.key, resource.gpu)
+        self._held: list[Resource] = []  # what was wanted goes back to the pool with the graph
+        weakref.finalize(self, _release, gpu, self._held).atexit = False
 
     # declaring
 
@@ -367,6 +365,11 @@ class Graph:
             lines.append(f'  "{item.name}" [label="{item.name}{ms}"{style}];')
             lines += [f'  "{writer[h]}" -> "{item.name}" [label="{n}"];' for n, h in item.reads.items() if h in writer]
         return "\n".join([*lines, "}"]) + "\n"
+
+
+def _release(gpu: Gpu, resources: list[Resource]) -> None:
+    for resource in resources:
+        gpu.release(resource.key, resource.gpu)
 
 
 def _mismatch(module: Module, wanted: Mapping[str, Binding], given: Mapping[str, Any]) -> str:

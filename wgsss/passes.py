@@ -203,7 +203,7 @@ class Encoder:
 
 def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
     compute = encoder.begin_compute_pass(label=item.name, **stamps)
-    compute.setpipeline(pipeline)
+    compute.set_pipeline(pipeline)
     compute.set_bind_group(0, group)
     compute.dispatch_workgroups(*item.state.groups)
     compute.end()
@@ -241,7 +241,7 @@ def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: di
     render = encoder.begin_render_pass(
         color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps
     )
-    render.setpipeline(pipeline)
+    render.set_pipeline(pipeline)
     if group is not None:
         render.set_bind_group(0, group)
     if state.indices is not None:

@@ -27,7 +27,7 @@ struct Varying {
 struct GBuffer {
     @location(0) where_seen: RGBA32Float, // atlas u, v; object id; 1
     @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
-    @location(2) base_color: RGBA8UnormSrgb,
+    @location(2) base_color: RGBA8UnormSrgb, // of the map alone: 8 bits hold its texels, but not their products
 }
 
 @vertex
@@ -47,6 +47,6 @@ fn fs(in: Varying) -> GBuffer {
         n = -n;
     }
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
-    let color = surface.base_color * textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
     return GBuffer(vec4f(in.atlas, f32(surface.id), 1.0), vec4f(n, specular), vec4f(color, 1.0));
 }

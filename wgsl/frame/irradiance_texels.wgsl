@@ -1,6 +1,6 @@
 // L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
 
-import package::mesh::{Vertex, Surface, bent_normal, color_part};
+import package::mesh::{Vertex, Surface, bent_normal, color_before};
 import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::targets::{RGBA16Float};
@@ -49,7 +49,7 @@ fn fs(in: Varying) -> Texel {
     let x = in.position;
     let n = bent_normal(normalize(in.normal), x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
-    let color = surface.base_color * textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
     var irradiance = transmitted_environment(environment, linear_wrap_u, n);
     for (var i = 0u; i < params.lights; i++) {
         let light = lights[i];
@@ -64,5 +64,5 @@ fn fs(in: Varying) -> Texel {
         }
         irradiance += transmitted(at, n, specular, lit, rho_dt_table);
     }
-    return Texel(vec4f(irradiance * color_part(color, 1.0 - surface.color_after), 1.0));
+    return Texel(vec4f(irradiance * color_before(surface, color), 1.0));
 }

@@ -1,6 +1,6 @@
 // M where light leaves at the point that it entered: the profile's total times L_d.
 
-import package::mesh::{Surface, color_part};
+import package::mesh::{Surface, color_before, color_after};
 import package::screen::{screen_corner};
 import package::targets::{RGBA32Float};
 
@@ -29,6 +29,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
-    let color = textureLoad(base_color, texel, 0).rgb;
+    let texel_color = textureLoad(base_color, texel, 0).rgb;
+    let color = color_before(surface, texel_color) * color_after(surface, texel_color);
     return Pixel(vec4f(params.total * color * textureLoad(irradiance, texel, 0).rgb, 1.0));
 }

@@ -1,7 +1,7 @@
 // M_front of one object at its pixels: its irradiance maps, each blurred by one Gaussian, summed by weight
 // (Mikkelsen 2009, 3.4, step 4a).
 
-import package::mesh::{Surface, color_part};
+import package::mesh::{Surface, color_after};
 import package::screen::{screen_corner};
 import package::targets::{RGBA32Float};
 
@@ -44,5 +44,5 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     M += params.weights[3].rgb * textureSampleLevel(blurred_3, linear_clamp, uv, 0.0).rgb;
     M += params.weights[4].rgb * textureSampleLevel(blurred_4, linear_clamp, uv, 0.0).rgb;
     M += params.weights[5].rgb * textureSampleLevel(blurred_5, linear_clamp, uv, 0.0).rgb;
-    return Pixel(vec4f(M * color_part(textureLoad(base_color, texel, 0).rgb, surface.color_after), 1.0));
+    return Pixel(vec4f(M * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));
 }
