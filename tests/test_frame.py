@@ -1,4 +1,4 @@
-"""The shared passes against closed forms: irradiance of each light, shadows, the surface's reflection, the composite."""
+"""The shared passes against closed forms: each light, shadows, the surface's reflection, the composite."""
 
 from __future__ import annotations
 
