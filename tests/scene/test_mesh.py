@@ -15,6 +15,17 @@ import trimesh
 from wgsss.errors import InputError
 from wgsss.scene import LoadedMesh, Mesh, load_mesh
 
+PLY_HEAD = """ply
+format ascii 1.0
+element vertex {vertices}
+property float x
+property float y
+property float z
+{extra}element face {faces}
+property list uchar int vertex_indices
+{corner}end_header
+"""
+
 SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
 
@@ -115,6 +126,34 @@ def test_quads_and_larger_faces_are_triangulated(tmp_path: Path) -> None:
     assert volume(mesh) == pytest.approx(2 * 1.5 * 3**0.5, rel=1e-6)
 
 
+@pytest.mark.parametrize("form", ["off", "ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("sizes", [(3, 4), (4, 5), (3, 4, 5), (5,)])
+def test_faces_of_differing_sizes(tmp_path: Path, form: str, sizes: tuple[int, ...]) -> None:
+    """Prisms over polygons, side by side in one file: triangles, quads and pentagons in every mixture."""
+    vertices: list[tuple] = []
+    faces: list[list[int]] = []
+    for i, n in enumerate(sizes):
+        at, turns = len(vertices), np.arange(n) * 2 * np.pi / n
+        vertices += [(3 * i + np.cos(a), np.sin(a), z) for z in (0, 1) for a in turns]
+        faces += [[at + j for j in reversed(range(n))], [at + n + j for j in range(n)]]
+        faces += [[at + j, at + (j + 1) % n, at + n + (j + 1) % n, at + n + j] for j in range(n)]
+    if form == "off":
+        path = write_off(tmp_path / "prisms.off", vertices, faces)
+    else:
+        path = tmp_path / "prisms.ply"
+        head = PLY_HEAD.format(vertices=len(vertices), faces=len(faces), extra="", corner="").replace("ascii", form)
+        if form == "ascii":
+            body = "\n".join(" ".join(map(str, row)) for row in [*vertices, *([len(f), *f] for f in faces)]).encode()
+        else:
+            order = "<" if "little" in form else ">"
+            body = b"".join(struct.pack(f"{order}3f", *v) for v in vertices)
+            body += b"".join(struct.pack(f"{order}B{len(f)}i", len(f), *f) for f in faces)
+        path.write_bytes(head.encode() + body)
+    mesh = quiet_load(path).mesh
+    assert len(mesh.faces) == sum(4 * n - 4 for n in sizes)
+    assert volume(mesh) == pytest.approx(sum(n / 2 * np.sin(2 * np.pi / n) for n in sizes), rel=1e-5)
+
+
 def test_scene_graph_places_and_mirrors_the_parts(tmp_path: Path) -> None:
     mirror = np.diag([-2.0, 1, 1, 1])
     mirror[:3, 3] = 10, 0, 0
@@ -194,18 +233,6 @@ def test_other_formats_keep_texture_seams(tmp_path: Path, suffix: str) -> None:
     (tmp_path / "seam.obj").write_text(SEAM)
     source = trimesh.load_mesh(tmp_path / "seam.obj", process=False)
     check_seam(load_with_warning(export(source, tmp_path / f"seam{suffix}"), mm_per_unit=1)[0].mesh)
-
-
-PLY_HEAD = """ply
-format ascii 1.0
-element vertex {vertices}
-property float x
-property float y
-property float z
-{extra}element face {faces}
-property list uchar int vertex_indices
-{corner}end_header
-"""
 
 
 def test_ply_with_texture_coordinates_per_corner(tmp_path: Path) -> None:
@@ -294,6 +321,20 @@ def test_obj_textures(tmp_path: Path) -> None:
     assert maps.base_color is not None and maps.base_color[0, 0].tolist() == [10, 20, 30]
     assert maps.specular is not None and maps.specular.shape == (4, 6) and maps.specular[0, 0] == 40
     assert maps.normal is None
+
+
+def test_a_texture_that_is_missing_or_damaged_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / "box.mtl").write_text("newmtl skin\nmap_Ks shine.png\n")
+    (tmp_path / "seam.obj").write_text("mtllib box.mtl\nusemtl skin\n" + SEAM)
+    loaded, text = load_with_warning(tmp_path / "seam.obj")
+    assert text.endswith("; specular texture left out: it is missing or damaged") and loaded.maps.specular is None
+
+    path = export(textured(image(1, 2, 3)), tmp_path / "box.glb")
+    content = path.read_bytes()
+    at = content.index(b"IDAT")
+    path.write_bytes(content[: at + 8] + bytes(8) + content[at + 16 :])
+    loaded, text = load_with_warning(path)
+    assert text == "box.glb: base_color texture left out: it is missing or damaged" and loaded.maps.base_color is None
 
 
 def test_no_textures_where_trimesh_makes_some_up(tmp_path: Path) -> None:

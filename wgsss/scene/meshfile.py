@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import re
 import warnings
@@ -15,8 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.images import read_map, require_file
+from wgsss.scene.images import require_file
 from wgsss.scene.material import Maps
+from wgsss.scene.polygons import off_as_triangles, ply_as_ascii
+from wgsss.scene.textures import shared_maps
 
 Array = npt.NDArray[Any]
 
@@ -79,7 +82,7 @@ def read_triangles(path: Path) -> Triangles:
     maps = Maps()
     with_uvs = [uv for uv in uvs if uv is not None]
     if len(with_uvs) == len(parts):
-        maps, left_out = _maps([getattr(mesh.visual, "material", None) for mesh, _ in parts], path)
+        maps, left_out = shared_maps([getattr(mesh.visual, "material", None) for mesh, _ in parts], path.parent)
         notes += left_out
     elif with_uvs:
         notes.append(f"texture coordinates left out: {len(parts) - len(with_uvs)} of {len(parts)} parts have none")
@@ -110,13 +113,28 @@ def _parts(path: Path) -> list[tuple[Any, Array]]:
     suffix = path.suffix.lower()
     try:
         with _quiet():
-            loaded = trimesh.load_scene(str(path), process=False, **_options(path))
+            loaded = _load(path)
             placed = [loaded.graph[node] for node in loaded.graph.nodes_geometry]
             meshes = [(loaded.geometry[name], np.asarray(matrix, np.float64)) for matrix, name in placed]
             return [(m, matrix) for m, matrix in meshes if isinstance(m, trimesh.Trimesh) and len(m.faces)]
     except Exception as error:  # its readers let every kind of exception through
         reason = " ".join(str(error).split()) if isinstance(error, ValueError | NotImplementedError) else ""
         raise InputError(f"{path}: damaged, or not a {suffix} file{f' ({reason[:100]})' if reason else ''}") from None
+
+
+def _load(path: Path) -> Any:
+    """A trimesh scene, as the file has it."""
+    import trimesh
+
+    options, suffix = _options(path), path.suffix.lower()
+    try:
+        return trimesh.load_scene(str(path), process=False, **options)
+    except (ValueError, TypeError):
+        rewrite = {".ply": ply_as_ascii, ".off": off_as_triangles}.get(suffix)
+        if rewrite is None:
+            raise
+        file, folder = io.BytesIO(rewrite(path.read_bytes())), trimesh.resolvers.FilePathResolver(str(path))
+        return trimesh.load_scene(file, file_type=suffix[1:], resolver=folder, process=False, **options)
 
 
 def _declared_faces(path: Path) -> int:
@@ -172,42 +190,3 @@ def _uvs(mesh: Any) -> Array | None:
     if uv is None or np.shape(uv) != (len(mesh.vertices), 2) or not np.isfinite(uv).all():
         return None
     return np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)
-
-
-def _maps(materials: list[Any], path: Path) -> tuple[Maps, list[str]]:
-    """The textures that all parts share, and notes on those left out."""
-    maps: dict[str, Array] = {}
-    notes = []
-    slots = {
-        "base_color": ("RGB", "baseColorTexture", "image", None),
-        "normal": ("RGB", "normalTexture", None, "norm"),
-        "specular": ("L", None, None, "map_ks"),
-    }
-    for slot, (mode, gltf, simple, mtl) in slots.items():
-        images = [_image(material, gltf, simple, mtl) for material in materials]
-        keys = {
-            image if isinstance(image, str) else getattr(image, "info", {}).get("file_path", id(image))
-            for image in images
-        }
-        if len(keys) > 1:
-            notes.append(f"{slot} textures left out: the parts do not share a single one")
-        elif images[0] is not None:
-            try:
-                maps[slot] = _pixels(images[0], mode, path.parent)
-            except (InputError, OSError, SyntaxError, ValueError):
-                notes.append(f"{slot} texture left out: it is missing or damaged")
-    return Maps(**maps), notes
-
-
-def _image(material: Any, gltf: str | None, simple: str | None, mtl: str | None) -> Any:
-    """The image of a trimesh material: one that is open, the name of a file, or None."""
-    for attribute in filter(None, (gltf, simple)):
-        image = getattr(material, attribute, None)
-        if getattr(image, "format", None) is not None:  # trimesh makes up images without a format for its own needs
-            return image
-    words = getattr(material, "kwargs", {}).get(mtl)
-    return words[-1] if words else None
-
-
-def _pixels(image: Any, mode: str, folder: Path) -> Array:
-    return read_map(folder / image, mode) if isinstance(image, str) else np.array(image.convert(mode))
