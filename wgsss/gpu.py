@@ -134,6 +134,9 @@ class Gpu:
         self._shaders: dict[str, Any] = {}
         self._pipelines: dict[Any, Any] = {}
         self._samplers: dict[str, Any] = {}
+        self._views: dict[
+            int, dict[tuple[str, int | None], Any]
+        ] = {}  # by id of a pooled texture, which is never freed
         self._free: defaultdict[Any, list[Any]] = defaultdict(list)
         self._fence = self.buffer(np.zeros(1, np.uint32))
 
@@ -211,11 +214,21 @@ class Gpu:
             self._pipelines[key] = (pipeline, pipeline.get_bind_group_layout(0))
         return self._pipelines[key]
 
+    def view(self, texture: Any, dimension: str = "2d", layer: int | None = None) -> Any:
+        """A view of a whole texture or of one layer; of a pooled texture, which comes back each frame, made once."""
+        views = self._views.get(id(texture), {})
+        if (dimension, layer) not in views:
+            layers = {} if layer is None else {"base_array_layer": layer, "array_layer_count": 1}
+            views[dimension, layer] = texture.create_view(dimension=dimension, **layers)
+        return views[dimension, layer]
+
     def acquire(self, key: TextureKey) -> Any:
         """A texture from the pool. Its content is undefined."""
         if self._free[key]:
             return self._free[key].pop()
-        return self.device.create_texture(size=key.size, format=key.format, usage=key.usage)
+        texture = self.device.create_texture(size=key.size, format=key.format, usage=key.usage)
+        self._views[id(texture)] = {}
+        return texture
 
     def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Any, Any]:
         """A buffer of at least `nbytes` from the pool, and the key to give it back with."""

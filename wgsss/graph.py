@@ -329,7 +329,7 @@ class Graph:
                 handle = item.reads.get(name) or item.writes.get(name)
                 resource = handle.resource.gpu if handle else item.imports[name]
                 if binding.space in ("texture", "storage_texture"):
-                    resource = resource.create_view(dimension=view_dimension(binding.type))
+                    resource = self.gpu.view(resource, view_dimension(binding.type))
                 elif handle:
                     resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
             entries.append({"binding": binding.number, "resource": resource})

@@ -173,7 +173,8 @@ class Encoder:
         for handle in item.writes.values():
             if handle.version == 1 and handle.resource.layout is not None:  # pooled buffers hold what was there before
                 self.encoder.clear_buffer(handle.resource.gpu)
-        (_encode_dispatch if isinstance(item.state, Dispatch) else _encode_draw)(self.encoder, item, *bound, stamps)
+        encode = _encode_dispatch if isinstance(item.state, Dispatch) else _encode_draw
+        encode(self.gpu, self.encoder, item, *bound, stamps)
         if self.walls:
             self._submit()
             self.gpu.fence()
@@ -201,7 +202,7 @@ class Encoder:
         self.times = {p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.passes, ticks, strict=True)}
 
 
-def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
+def _encode_dispatch(gpu: Gpu, encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
     compute = encoder.begin_compute_pass(label=item.name, **stamps)
     compute.set_pipeline(pipeline)
     compute.set_bind_group(0, group)
@@ -209,13 +210,11 @@ def _encode_dispatch(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps
     compute.end()
 
 
-def _encode_draw(encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
+def _encode_draw(gpu: Gpu, encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
     state: Draw = item.state
 
     def view(handle: Handle) -> Any:
-        return handle.resource.gpu.create_view(
-            dimension="2d", base_array_layer=handle.layer(state.layer), array_layer_count=1
-        )
+        return gpu.view(handle.resource.gpu, layer=handle.layer(state.layer))
 
     colors = [
         {
