@@ -15,6 +15,10 @@ ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("WGSSS_DATA", ROOT.parent / "shared" / "data"))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-goldens", action="store_true", help="write the goldens anew, and compare nothing")
+
+
 @pytest.fixture(scope="session")
 def gpu() -> Gpu:
     """The device. Tests need one: a missing adapter is an error, not a skip."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from wgsss.scene import Scene
 
 DEFAULT_METHOD = "deon07"
+_SCENE = "a built-in scene (see 'wgsss scenes'), a scene file (.toml) or a mesh (.ply .obj .stl .off .glb .gltf)"
 
 
 class Parser(argparse.ArgumentParser):
@@ -43,7 +44,7 @@ def command(commands: Any, name: str, run: Any, summary: str, **rest: Any) -> Pa
 def add_scene(parser: Parser) -> None:
     """The scene, and the choices that go with it."""
     add = parser.add_argument
-    add("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a mesh file (see 'wgsss scenes')")
+    add("scene", metavar="SCENE", help=_SCENE)
     add("--material", metavar="NAME", help="of all objects: a measured material or a material file (.toml)")
     add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")

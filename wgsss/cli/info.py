@@ -57,6 +57,7 @@ def _text(result: dict[str, Any]) -> str:
     rows = [[name, text] for name, text in result["versions"].items()]
     rows.append(["platform", result["platform"]])
     rows += [["adapter", f"{a['device']} ({a['adapter_type']}), {a['description']}"] for a in result["adapters"]]
+    rows += [] if result["adapters"] else [["adapter", "none"]]
     rows.append(["chosen", result["chosen"] or "none"])
     if "clock" in result:
         rows.append(["clock", result["clock"]])
