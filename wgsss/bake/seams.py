@@ -1,0 +1,87 @@
+"""The borders of the charts, and where the surface goes on beyond them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.unwrap import Surface, atlas_vertices
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Seams:
+    """The border edges of the charts, each with the map that unfolds the surface across it."""
+
+    ends: Array
+    """float64 (N, 2, 2): the ends of the edge, uv"""
+    outward: Array
+    """float64 (N,): +1 where the outside of the chart is to the left of the edge (in uv, v down), else -1"""
+    maps: Array
+    """float64 (N, 2, 3): the affine map from texture coordinates beyond the edge to those of the neighbouring triangle"""
+
+
+def find_seams(surface: Surface, roots: Array) -> Seams:
+    """The seams of a surface. `roots` (R, 2, 2) are those of its stretch.
+
+    The map takes the edge to the same edge of the neighbouring triangle, and a step perpendicular to it on the surface
+    to the step of the same length in mm that continues it. At open edges of the mesh it is the reflection about the
+    edge, as measured on the surface: what is constant stays constant, and nothing flows out.
+    """
+    atlas = surface.atlas.astype(np.float64)
+    start = surface.faces.reshape(-1)  # half-edge 3 f + k goes from corner k of face f to the next one
+    end, third = surface.faces[:, [1, 2, 0]].reshape(-1), surface.faces[:, [2, 0, 1]].reshape(-1)
+    has_area = np.abs(np.linalg.det(atlas[surface.faces[:, 1:]] - atlas[surface.faces[:, :1]])) > 1e-14
+    usable = np.repeat(has_area, 3) & (surface.vertex[start] != surface.vertex[end])
+    point = atlas_vertices(surface.vertex, surface.atlas)
+    inside = _others(point[start], point[end], usable)
+    other = _others(surface.vertex[start], surface.vertex[end], usable)
+
+    border = np.flatnonzero(usable & (inside < 0))
+    i, j = start[border], end[border]
+    edge = atlas[j] - atlas[i]
+    step, side = _perpendicular(edge, atlas[third[border]] - atlas[i], (roots[i] + roots[j]) / 2)
+    frame = np.stack([edge, -step], axis=-1)
+
+    beyond = other[border]
+    open_edge = beyond < 0
+    beyond = np.where(open_edge, border, beyond)
+    same_way = surface.vertex[start[beyond]] == surface.vertex[i]
+    k, m = np.where(same_way, start[beyond], end[beyond]), np.where(same_way, end[beyond], start[beyond])
+    edge_beyond = atlas[m] - atlas[k]
+    step_beyond, _ = _perpendicular(edge_beyond, atlas[third[beyond]] - atlas[k], (roots[k] + roots[m]) / 2)
+    A = np.stack([edge_beyond, step_beyond], axis=-1) @ np.linalg.inv(frame)
+    t = atlas[k] - np.einsum("nij,nj->ni", A, atlas[i])
+    return Seams(np.stack([atlas[i], atlas[j]], axis=1), -side, np.concatenate([A, t[..., None]], axis=-1))
+
+
+def apply(maps: Array, uv: Array) -> Array:
+    """(N, 2): affine maps (N, 2, 3) applied to one texture coordinate (N, 2) each."""
+    return np.einsum("nij,nj->ni", maps[..., :2], uv) + maps[..., 2]
+
+
+def _others(start: Array, end: Array, usable: Array) -> Array:
+    """For each half-edge the first other one between the same two vertices, or -1."""
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    edges = np.where(usable, low.astype(np.int64) * (int(high.max()) + 1) + high, -1)
+    order = np.argsort(edges, kind="stable")
+    ordered = edges[order]
+    first = np.searchsorted(ordered, ordered)  # where the group of equal edges begins
+    second = np.minimum(first + 1, len(order) - 1)
+    pick = np.where(first == np.arange(len(order)), second, first)
+    found = (ordered[pick] == ordered) & (pick != np.arange(len(order))) & (ordered >= 0)
+    others = np.full(len(order), -1)
+    others[order[found]] = order[pick[found]]
+    return others
+
+
+def _perpendicular(edge: Array, inward: Array, root: Array) -> tuple[Array, Array]:
+    """The uv step of 1 mm on the surface perpendicular to `edge`, towards `inward`; and on which side that is."""
+    x = np.linalg.solve(root, edge[..., None])[..., 0]  # the edge in mm, in an orthonormal frame
+    side = np.sign(edge[:, 0] * inward[:, 1] - edge[:, 1] * inward[:, 0])
+    normal = side[:, None] * np.stack([-x[:, 1], x[:, 0]], axis=-1) / np.linalg.norm(x, axis=1, keepdims=True)
+    return np.einsum("nij,nj->ni", root, normal), side

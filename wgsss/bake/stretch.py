@@ -1,0 +1,82 @@
+"""How the atlas stretches the surface: the metric of the parametrisation (Mikkelsen 2009, eq. 43, 44)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.unwrap import Surface, atlas_vertices
+from wgsss.scene.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The atlas around each render vertex: a step d (mm) on the surface is the step root @ axes @ d in the atlas (uv).
+
+    The gradients of u and v on a face, as rows, are root @ axes, and with a root that is symmetric the axes are the
+    orthonormal pair nearest to the gradients. `root` is the symmetric square root of the inverse metric (J^T J)^-1, with J = [sigma_s sigma_t] the derivatives of
+    position by texture coordinate (eq. 43, 44); a texture area dA covers dA / det(root) mm^2.
+    """
+
+    root: Array
+    """float64 (R, 2, 2), uv per mm"""
+    axes: Array
+    """float64 (R, 2, 3): means of orthonormal directions on the surface; root @ axes are the gradients of u and v where
+    the surface is flat, elsewhere once the axes are made orthonormal"""
+
+
+def stretch(mesh: Mesh, surface: Surface) -> Stretch:
+    """The stretch at the render vertices: means over the faces around, weighted by area.
+
+    Roots are averaged rather than inverse metrics, since area times root stays bounded where a face degenerates; and
+    apart from the axes, since the mean of gradients over a bent surface is too short.
+    """
+    gradients, areas = face_gradients(mesh, surface)
+    roots = _root(gradients @ gradients.transpose(0, 2, 1))
+    sound = np.linalg.det(roots) > 0
+    areas = np.where(sound, areas, 0)
+    axes = np.linalg.solve(np.where(sound[:, None, None], roots, np.eye(2)), gradients)
+    point = atlas_vertices(surface.vertex, surface.atlas)
+    corner = point[surface.faces].reshape(-1)
+    count = int(point.max()) + 1
+    weight = np.bincount(corner, np.repeat(areas, 3), count)
+
+    def mean(values: Array) -> Array:
+        total = np.empty((count, *values.shape[1:]))
+        for index in np.ndindex(values.shape[1:]):
+            total[(slice(None), *index)] = np.bincount(corner, np.repeat(areas * values[(slice(None), *index)], 3), count)
+        return total / np.where(weight > 0, weight, 1).reshape(-1, *[1] * (values.ndim - 1))
+
+    root = mean(roots)
+    # Where all faces around are degenerate, nothing is drawn: any finite value does.
+    root[weight == 0] = np.average(roots, axis=0, weights=areas) if areas.any() else np.eye(2)
+    return Stretch(root[point], mean(axes)[point])
+
+
+def face_gradients(mesh: Mesh, surface: Surface) -> tuple[Array, Array]:
+    """float64 (F, 2, 3): the gradients of u and v over each face, uv per mm, zero for faces without an area; and their
+    areas (F,), mm^2. They are the rows of the pseudo-inverse of [sigma_s sigma_t]."""
+    corners = mesh.positions.astype(np.float64)[mesh.faces]
+    texture = surface.atlas.astype(np.float64)[surface.faces]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(first, second)
+    area = np.linalg.norm(normal, axis=1)  # twice the triangle's
+    longest = np.maximum(np.einsum("ij,ij->i", first, first), np.einsum("ij,ij->i", second, second))
+    has_area = area > 1e-10 * longest
+    # The gradients of the barycentric coordinates of corners 1 and 2.
+    barycentric = np.stack([np.cross(second, normal), np.cross(normal, first)], axis=1)
+    barycentric /= np.where(has_area, area, 1)[:, None, None] ** 2
+    edges = np.stack([texture[:, 1] - texture[:, 0], texture[:, 2] - texture[:, 0]], axis=-1)
+    return np.where(has_area[:, None, None], edges @ barycentric, 0), np.where(has_area, area / 2, 0)
+
+
+def _root(matrices: Array) -> Array:
+    """(..., 2, 2): symmetric roots of positive semi-definite matrices, (A + sqrt(det) I) / sqrt(tr + 2 sqrt(det))."""
+    root_det = np.sqrt(np.maximum(np.linalg.det(matrices), 0))
+    scale = np.sqrt(np.trace(matrices, axis1=-2, axis2=-1) + 2 * root_det)[..., None, None]
+    return (matrices + root_det[..., None, None] * np.eye(2)) / np.where(scale > 0, scale, 1)

@@ -1,0 +1,190 @@
+"""Unique texture coordinates for a mesh, and the render mesh that carries them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.cache import Arrays, cached
+from wgsss.errors import InputError
+from wgsss.gpu import Gpu
+from wgsss.graph import Graph
+from wgsss.scene.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+COVERAGE_SIZE = 1024
+"""Side of the map on which a file's texture coordinates are tested for overlaps, in texels."""
+MAX_SHARE = 1e-3
+"""Share of covered texels that may overlap, and of the surface that may be without texels: rounding, not design."""
+MARGIN = 1e-4
+"""How far texture coordinates may leave the unit square before they are fitted into it."""
+PADDING = 5
+"""Empty texels around each chart where the atlas is about 1024 to 1300 texels wide, the size that xatlas aims at: at
+least 8 between two charts at 1024, and 4 at 512."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The render mesh: the mesh's vertices, split where texture coordinates or normals differ."""
+
+    vertex: Array
+    """int32 (R,), index into the mesh's positions"""
+    normals: Array
+    """float32 (R, 3), unit shading normals"""
+    atlas: Array
+    """float32 (R, 2), unique texture coordinates in 0..1, v down: no two points of the surface share one"""
+    uvs: Array
+    """float32 (R, 2), the file's own texture coordinates for its maps, v down, or zeros"""
+    faces: Array
+    """int32 (F, 3), indices of render vertices, the faces in the mesh's order"""
+    charts: Array
+    """int32 (F,), the connected piece of the atlas that a face is in, 0..C-1"""
+
+
+def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
+    """The render mesh of `mesh`, cached. Its own texture coordinates are the atlas where they are unique, else xatlas
+    makes one.
+
+    Raises InputError where the mesh has no face with an area.
+    """
+    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs]
+
+    def make() -> Arrays:
+        surface = _unwrap(gpu, mesh)
+        return {f.name: getattr(surface, f.name) for f in fields(Surface)}
+
+    return Surface(**cached("unwrap", key, make, code=[Mesh, "bake/atlas_faces"], label=f"unwrapping {len(mesh.faces)} faces"))
+
+
+def split(mesh: Mesh) -> Surface:
+    """The render mesh of `mesh` without an atlas, for passes that need none: `atlas` and `charts` are zero."""
+    return _render_mesh(mesh, None)
+
+
+def _unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
+    atlas = None if mesh.corner_uvs is None else _fitted(mesh.corner_uvs)
+    if atlas is None or not is_unique(gpu, mesh, atlas):
+        atlas = _xatlas(mesh)
+    surface = _render_mesh(mesh, atlas)
+    charts = _components(atlas_vertices(surface.vertex, surface.atlas)[surface.faces])
+    return replace(surface, charts=charts)
+
+
+def _render_mesh(mesh: Mesh, atlas: Array | None) -> Surface:
+    """The mesh split where what is given per corner differs: the atlas (F, 3, 2), its own texture coordinates, normals."""
+    corners = [a.reshape(-1, a.shape[-1]) for a in (atlas, mesh.corner_uvs, mesh.corner_normals) if a is not None]
+    first, index = _distinct([mesh.faces.reshape(-1, 1), *corners])
+    vertex = mesh.faces.reshape(-1)[first]
+    none = np.zeros((len(first), 2), np.float32)
+    return Surface(
+        vertex=vertex,
+        normals=mesh.shading_normals.reshape(-1, 3)[first],
+        atlas=none if atlas is None else atlas.reshape(-1, 2)[first],
+        uvs=none if mesh.corner_uvs is None else mesh.corner_uvs.reshape(-1, 2)[first],
+        faces=index.reshape(-1, 3).astype(np.int32),
+        charts=np.zeros(len(mesh.faces), np.int32),
+    )
+
+
+def atlas_vertices(vertex: Array, atlas: Array) -> Array:
+    """int64 (R,): equal for render vertices that are one point of the mesh and of the atlas, whatever their normals."""
+    return _distinct([vertex.reshape(-1, 1), atlas])[1]
+
+
+def is_unique(gpu: Gpu, mesh: Mesh, corner_uvs: Array) -> bool:
+    """Whether texture coordinates (F, 3, 2) in the unit square give every point of the surface texels of its own: no
+    overlaps, and (nearly) no part of the surface without an area in the map."""
+    edges = corner_uvs[:, 1:] - corner_uvs[:, :1].astype(np.float64)
+    flat = np.abs(np.linalg.det(edges)) < 1e-12
+    areas = np.linalg.norm(mesh.face_normals, axis=1)
+    if areas[flat].sum() > MAX_SHARE * areas.sum():
+        return False
+    graph = Graph(gpu)
+    uvs = gpu.buffer(corner_uvs)
+    drawn = [
+        graph.draw("bake/atlas_faces", size=(COVERAGE_SIZE, COVERAGE_SIZE), count=3 * len(mesh.faces), corner_uvs=uvs,
+                   params=dict(face_count=len(mesh.faces), reverse=order))
+        for order in (0, 1)
+    ]  # fmt: skip
+    graph.run(*drawn)
+    last, first = (graph.read(handle) for handle in drawn)
+    return 0 < np.count_nonzero(last) and np.count_nonzero(last != first) <= MAX_SHARE * np.count_nonzero(last)
+
+
+def _fitted(uvs: Array) -> Array:
+    """Texture coordinates moved and scaled into the unit square, where they leave it."""
+    low, high = uvs.min(axis=(0, 1)), uvs.max(axis=(0, 1))
+    if low.min() < -MARGIN or high.max() > 1 + MARGIN:
+        uvs = (uvs - low) / np.maximum(high - low, np.finfo(np.float32).tiny)
+    return np.clip(uvs, 0, 1)
+
+
+def _xatlas(mesh: Mesh) -> Array:
+    """float32 (F, 3, 2): an atlas that fills the unit square."""
+    import xatlas
+
+    size = np.ptp(mesh.bounds, axis=0).max()
+    twice_areas = np.linalg.norm(mesh.face_normals, axis=1)
+    if not (size > 0 and twice_areas.max() > 1e-12 * size * size):
+        raise InputError(f"{mesh.name}: no face has an area, so the mesh cannot be unwrapped")
+    # xatlas compares areas with absolute thresholds: faces much smaller than 1 would end up as hundreds of charts.
+    unit = np.sqrt(np.median(twice_areas[twice_areas > 0]))
+    pack = xatlas.PackOptions()
+    pack.padding = PADDING
+    pack.resolution = 0  # one page, however large
+    atlas = xatlas.Atlas()
+    atlas.add_mesh((_smoothed(mesh) / unit).astype(np.float32), mesh.faces.astype(np.uint32))
+    atlas.generate(xatlas.ChartOptions(), pack)
+    _, faces, uvs = atlas.get_mesh(0)
+    if not atlas.chart_count or len(faces) != len(mesh.faces):
+        raise InputError(f"{mesh.name}: the mesh cannot be unwrapped")
+    # The page is not square: stretched to fill the map, with room for the gutters along its rim.
+    page = np.array([atlas.width, atlas.height])
+    return ((uvs * page + PADDING) / (page + 2 * PADDING)).astype(np.float32)[faces]
+
+
+def _smoothed(mesh: Mesh) -> Array:
+    """float64 (V, 3): positions moved a little along their normals towards the mean of their neighbours, mm. On rough
+    scans that saves a third of the charts; what it distorts, the stretch of the true surface accounts for."""
+    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]).T
+    degree = np.maximum(np.bincount(ends.reshape(-1), minlength=len(mesh.positions)), 1)
+    smooth = mesh
+    for _ in range(2):
+        positions, normals = smooth.positions.astype(np.float64), smooth.normals.astype(np.float64)
+        total = np.zeros_like(positions)
+        for a, b in (ends, ends[::-1]):
+            for axis in range(3):
+                total[:, axis] += np.bincount(a, positions[b, axis], len(positions))
+        step = np.einsum("ij,ij->i", total / degree[:, None] - positions, normals)
+        smooth = mesh.deformed(positions + 0.5 * step[:, None] * normals)
+    return smooth.positions.astype(np.float64) - mesh.bounds[0]
+
+
+def _distinct(columns: list[Array]) -> tuple[Array, Array]:
+    """First rows (N,) of each distinct row of the joined columns, sorted by them, and for each row its place there."""
+    bits = [c.astype(np.int32) if c.dtype.kind == "i" else (c + np.float32(0)).view(np.int32) for c in columns]
+    rows = np.ascontiguousarray(np.concatenate(bits, axis=1))
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    new = np.ones(len(rows), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    index = np.empty(len(rows), np.int64)
+    index[order] = np.cumsum(new) - 1
+    return order[new], index
+
+
+def _components(faces: Array) -> Array:
+    """int32 (F,): the connected component of each face, through the vertices that faces (F, 3) share."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = int(faces.max()) + 1
+    ends = faces[:, [0, 1]].reshape(-1, 2), faces[:, [1, 2]].reshape(-1, 2)
+    rows, columns = np.concatenate(ends).T
+    joined = coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
+    labels = connected_components(joined, directed=False)[1]
+    return np.unique(labels[faces[:, 0]], return_inverse=True)[1].astype(np.int32)
