@@ -15,8 +15,8 @@ from wgsss.scene.scene import Object
 DEFAULT_MATERIAL = MATERIALS["marble"]
 # A key light from the front, upper left; a dimmer one from behind, to show what shines through; a faint surrounding.
 DEFAULT_LIGHTS: tuple[Light, ...] = (
-    DirectionalLight((0.6, -0.7, -0.8), (3.0, 3.0, 3.0)),
-    DirectionalLight((-0.4, -0.3, 1.0), (1.5, 1.5, 1.5)),
+    DirectionalLight((0.6, -0.7, -0.8), (2.2, 2.2, 2.2)),
+    DirectionalLight((-0.4, -0.3, 1.0), (1.6, 1.6, 1.6)),
     EnvironmentLight((0.1, 0.1, 0.1)),
 )
 _AZIMUTH, _ELEVATION = 20.0, 10.0  # degrees: nearly from the front, but no symmetric thing looks flat
