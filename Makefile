@@ -6,7 +6,7 @@ export XDG_RUNTIME_DIR # unset, it makes Vulkan drivers print noise
 BIN := .venv/bin
 DEMO := ear milk gyroid statue leaf
 
-.PHONY: help setup demo test lint clean
+.PHONY: help setup demo test bench lint clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile
@@ -16,14 +16,17 @@ setup: ## virtual environment, dependencies and, where there is none, a software
 
 demo: setup ## render pictures into out/
 	@mkdir -p out
-	$(BIN)/wgsss render ear --method lambert --size 512x512 -o out/ear-lambert.png
+	$(BIN)/python examples/side_by_side.py ear lambert deon07 -o out/methods.png
 	@for scene in $(DEMO); do \
-		(set -x; $(BIN)/wgsss render $$scene --method deon07 --size 512x512 -o out/$$scene.png) || exit 1; \
+		(set -x; $(BIN)/wgsss render $$scene -o out/$$scene.png) || exit 1; \
 	done
-	@echo "Pictures: $(CURDIR)/out (ear.png beside ear-lambert.png shows what the diffusion does)"
+	@echo "Pictures: $(CURDIR)/out (methods.png shows what diffusion does)"
 
 test: setup ## run the tests
 	@$(BIN)/pytest -q --durations=10
+
+bench: setup ## measure what things cost
+	@$(BIN)/python tests/benchmarks.py
 
 lint: setup ## check style and types
 	$(BIN)/ruff check

@@ -1,0 +1,118 @@
+"""What things cost, as medians and ratios: `make bench`. Not a test: figures depend on the machine.
+
+Every figure is a median over several runs, with the range of its middle half; first runs, which compile, are dropped.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from wgsss.gpu import Gpu, default_gpu
+from wgsss.graph import Graph
+from wgsss.methods import METHODS, make_method
+from wgsss.render import Renderer
+from wgsss.scene import load_scene
+
+SIZE = (512, 512)
+PASSES = 12
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Seconds per run."""
+
+    runs: list[float]
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.runs)
+
+    def __str__(self) -> str:
+        low, _, high = statistics.quantiles(self.runs, n=4) if len(self.runs) > 1 else self.runs * 3
+        return f"{1e3 * self.median:9.2f} ms  ({1e3 * low:.2f} to {1e3 * high:.2f}, {len(self.runs)} runs)"
+
+
+def measure(run: Callable[[], object], times: int, warm_up: int = 1) -> Figure:
+    """Wall-clock seconds of `run()`."""
+    runs = []
+    for _ in range(warm_up + times):
+        start = time.perf_counter()
+        run()
+        runs.append(time.perf_counter() - start)
+    return Figure(runs[warm_up:])
+
+
+def command(*argv: str, cache: Path) -> Callable[[], object]:
+    """`wgsss` as a process, from start to end."""
+    env = {**os.environ, "WGSSS_CACHE": str(cache)}
+    return lambda: subprocess.run([sys.executable, "-m", "wgsss", *argv], env=env, check=True, capture_output=True)
+
+
+def say(what: str, figure: Figure, goal_s: float = 0.0, against: Figure | None = None) -> None:
+    """A row: the figure, and its ratio to a goal or to another figure."""
+    ratio = f"{figure.median / goal_s:5.2f} of {1e3 * goal_s:g} ms" if goal_s else ""
+    ratio = f"{figure.median / against.median:5.2f} x" if against else ratio
+    print(f"{what:46}{figure}  {ratio}".rstrip(), flush=True)
+
+
+def commands() -> None:
+    """Processes from start to file, with and without what the cache holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        cache, picture = Path(folder, "cache"), str(Path(folder, "ear.png"))
+        say("wgsss --help", measure(command("--help", cache=cache), 9), 0.3)
+        render = command("render", "ear", "--size", f"{SIZE[0]}x{SIZE[1]}", "-o", picture, cache=cache)
+        cold = measure(render, 1, warm_up=0)
+        warm = measure(render, 7)
+        say("wgsss render ear --size 512x512, warm cache", warm, 3.0)
+        say("  the same, cold cache", cold, against=warm)
+
+
+def encoding(gpu: Gpu) -> None:
+    """What a graph costs Python. The passes draw two texels, so that the device has next to nothing to do."""
+
+    def frame() -> None:
+        graph = Graph(gpu)
+        value = graph.dispatch("frame/rho_dt", size=(2, 1), params={"alpha": 0.1, "eta": 1.3})
+        for _ in range(PASSES - 1):
+            value = graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})
+        graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})  # not wanted, hence dropped
+        graph.run(value)
+        assert (len(graph.ran), len(graph.culled)) == (PASSES, 1)
+
+    runs = []
+    for _ in range(60):
+        runs += measure(frame, 1, warm_up=0).runs
+        gpu.fence()  # outside what is measured
+    say(f"declare, cull and encode {PASSES} passes", Figure(runs[10:]), 2e-3)
+
+
+def methods(gpu: Gpu) -> None:
+    """A frame by each method over its sweep, against Lambert's."""
+    scene = load_scene("ear")
+    plain = None
+    for name, kind in METHODS.items():
+        for knobs in kind.sweep:
+            start = time.perf_counter()
+            renderer = Renderer(scene, make_method(name, knobs), SIZE, gpu)
+            baked = time.perf_counter() - start
+            figure = measure(lambda renderer=renderer: renderer.frame(timed=False), 7, warm_up=2)  # type: ignore[misc]
+            plain = plain or figure
+            chosen = " ".join(f"{knob}={value}" for knob, value in knobs.items())
+            say(f"frame of ear by {name} {chosen}".rstrip(), figure, against=plain)
+            print(f"{'  prepared in':46}{1e3 * baked:9.2f} ms")
+
+
+if __name__ == "__main__":
+    device = default_gpu()
+    print(f"{device.name}; {os.cpu_count()} cores\n")
+    commands()
+    encoding(device)
+    methods(device)

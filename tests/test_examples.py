@@ -1,0 +1,83 @@
+"""What users copy from works: the scene files and scripts in examples/, and what the README shows."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from PIL import Image as Picture
+
+from wgsss.cli import _parse
+from wgsss.methods import METHODS
+from wgsss.scene import EnvironmentLight, load_material, load_scene
+
+EXAMPLES = ROOT / "examples"
+README = (ROOT / "README.md").read_text()
+MATERIALS = ["jade"]
+SCENES = sorted({path.stem for path in EXAMPLES.glob("*.toml")} - set(MATERIALS))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_files_load_and_are_lit(name: str) -> None:
+    scene = load_scene(EXAMPLES / f"{name}.toml")
+    assert any(not isinstance(light, EnvironmentLight) for light in scene.lights)
+    view, middle = scene.camera.view(), scene.bounds.mean(axis=0)
+    assert abs((view[:3, :3] @ middle + view[:3, 3])[:2]).max() < np.ptp(scene.bounds, axis=0).max() / 2
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_material_files_load(name: str) -> None:
+    assert load_material(EXAMPLES / f"{name}.toml").name == name
+
+
+def test_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    script = runpy.run_path(str(EXAMPLES / "side_by_side.py"))
+    script["main"](["sphere", "lambert", "lambert", "--side", "16", "-o", str(tmp_path / "a.png")])
+    with Picture.open(tmp_path / "a.png") as picture:
+        left, right = np.split(np.asarray(picture), 2, axis=1)
+    np.testing.assert_array_equal(left, right)
+    assert capsys.readouterr().out.count("mean radiance") == 2
+
+
+def test_python_in_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", README, re.S)
+    assert blocks
+    smaller = {"(512, 512)": "(24, 24)", '"ear"': '"ear", vertices=500', "15.0": "15.0, vertices=300", "=2048": "=64"}
+    for block in blocks:
+        for whole, small in smaller.items():
+            block = block.replace(whole, small)
+        exec(compile(block, "README.md", "exec"), {})
+
+
+def test_commands_in_the_readme_parse() -> None:
+    lines = [
+        line.split("#")[0].strip()
+        for block in re.findall(r"```sh\n(.*?)```", README, re.S)
+        for line in block.splitlines()
+    ]
+    commands = [shlex.split(line)[1:] for line in lines if line.startswith("wgsss ")]
+    assert len(commands) > 5
+    for command in commands:
+        _parse(command)
+
+
+def test_scene_file_in_the_readme_loads(tmp_path: Path) -> None:
+    for number, block in enumerate(re.findall(r"```toml\n(.*?)```", README, re.S)):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(re.sub(r'mesh = ".*"\nsize_mm = .*', 'shape = "sphere"', block))
+        load_scene(path)
+
+
+def test_the_readme_names_every_method_and_every_file_it_shows() -> None:
+    for name, kind in METHODS.items():
+        row = re.search(rf"^\| `{name}` \|.*$", README, re.M)
+        assert row and kind.source.split(",")[0] in row.group(), f"{name}: the table of methods needs a row"
+    prose = re.sub(r"```.*?```", "", README, flags=re.S)
+    for target in re.findall(r"\]\(([^)#]+)\)", prose):
+        assert target.startswith("http") or (ROOT / target).exists(), target

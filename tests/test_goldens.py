@@ -1,0 +1,143 @@
+"""Every built-in scene by every method, against the picture in goldens/ that was looked at and found right.
+
+A golden catches change, it does not measure accuracy. On the adapter and driver that drew it, at most 0.1 % of pixels
+differ by more than 1 of 255 in any channel; on another, the pictures look alike by FLIP. What fails is left in
+out/goldens/: what was drawn, the difference, the golden.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from conftest import ROOT
+from PIL import Image as Picture
+
+from wgsss.gpu import Gpu
+from wgsss.methods import METHODS, make_method
+from wgsss.output import save
+from wgsss.render import Image, Renderer
+from wgsss.scene import Scene, load_scene
+from wgsss.scene.builtin import SCENES
+
+GOLDENS, FAILED = ROOT / "goldens", ROOT / "out" / "goldens"
+
+SIZE = (128, 128)
+VERTICES = {"milk": 5000, "statue": 5000}  # the least that they can have; 2000 for the others
+KNOBS: dict[str, dict[str, Any]] = {"deon07": {"map_size": 256}}
+TIME_S = 0.7  # what moves is not at rest
+
+ADAPTER = "wgsss.adapter"  # the label of a golden that tells what drew it
+MOST_OFF, MOST_PIXELS_OFF = 1, 0.001
+# The mean over the object. Rounding differs between drivers; what a method does to Lambert's picture is more.
+MOST_FLIP = 0.01
+
+Pixels = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Golden:
+    pixels: Pixels  # (H, W, 4)
+    adapter: str
+
+
+def golden_path(scene: str, method: str) -> Path:
+    return GOLDENS / scene / f"{method}.png"
+
+
+def read(path: Path) -> Golden:
+    with Picture.open(path) as picture:
+        return Golden(np.asarray(picture.convert("RGBA")), str(picture.info.get(ADAPTER, "")))
+
+
+@lru_cache(maxsize=1)
+def load(scene: str) -> Scene:
+    return load_scene(scene, vertices=VERTICES.get(scene, 2000))
+
+
+def draw(gpu: Gpu, scene: str, method: str) -> Image:
+    renderer = Renderer(load(scene), make_method(method, KNOBS.get(method)), SIZE, gpu)
+    image = renderer.frame(TIME_S, timed=False)
+    return replace(image, metadata={**image.metadata, "adapter": gpu.name})
+
+
+def share_off(got: Pixels, golden: Pixels) -> float:
+    """The share of pixels with a channel further off than one step."""
+    return float((np.abs(got.astype(int) - golden) > MOST_OFF).any(axis=2).mean())
+
+
+def over_black(pixels: Pixels) -> npt.NDArray[np.float32]:
+    return (pixels[..., :3] / 255.0 * (pixels[..., 3:] / 255.0)).astype(np.float32)
+
+
+def flip(got: Pixels, golden: Pixels) -> float:
+    """The mean FLIP error over the pixels where either shows something."""
+    import flip_evaluator
+
+    error, _, _ = flip_evaluator.evaluate(over_black(golden), over_black(got), "LDR", applyMagma=False)
+    seen = (got[..., 3] > 0) | (golden[..., 3] > 0)
+    return float(error[..., 0][seen].mean())
+
+
+def show(got: Pixels, golden: Pixels, path: Path) -> None:
+    """Got, difference and golden side by side. The fourth root makes a difference of one step visible."""
+    difference = np.abs(over_black(got) - over_black(golden)) ** 0.25
+    panels = np.concatenate([over_black(got), difference, over_black(golden)], axis=1)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Picture.fromarray(np.round(panels * 255).astype(np.uint8)).save(path)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scene", SCENES)
+def test_golden(gpu: Gpu, request: pytest.FixtureRequest, scene: str, method: str) -> None:
+    path = golden_path(scene, method)
+    image = draw(gpu, scene, method)
+    if request.config.getoption("--update-goldens"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        save(image, path)
+        pytest.skip(f"wrote {path.relative_to(ROOT)}: look at it")
+    if not path.is_file():
+        pytest.fail(f"{path.relative_to(ROOT)} is missing: write it with `pytest --update-goldens`, and look at it")
+
+    golden, failed = read(path), FAILED / f"{scene}-{method}.png"
+    assert image.display.shape == golden.pixels.shape
+    same = golden.adapter == gpu.name
+    off, flipped = share_off(image.display, golden.pixels), flip(image.display, golden.pixels)
+    figures = f"{off:.3%} of pixels off by more than {MOST_OFF}/255, FLIP {flipped:.5f}"
+    figures += f" ({'same adapter' if same else f'drawn by {golden.adapter}'})"
+    print(figures)
+    if off <= MOST_PIXELS_OFF if same else flipped <= MOST_FLIP:
+        failed.unlink(missing_ok=True)
+        return
+    show(image.display, golden.pixels, failed)
+    pytest.fail(f"{figures}: see {failed} (drawn, difference, golden)")
+
+
+def test_there_is_no_golden_that_nothing_draws() -> None:
+    wanted = {golden_path(scene, method) for scene in SCENES for method in METHODS}
+    found = {path for path in GOLDENS.rglob("*") if path.is_file()}
+    assert sorted(map(str, found - wanted)) == []
+
+
+def test_what_other_drivers_may_change_is_less_than_what_a_method_changes() -> None:
+    for scene in SCENES:
+        plain, *others = (
+            read(golden_path(scene, method)).pixels for method in ("lambert", *(METHODS.keys() - {"lambert"}))
+        )
+        assert all(flip(other, plain) > MOST_FLIP for other in others), scene
+
+
+def test_one_step_passes_and_two_do_not() -> None:
+    random = np.random.default_rng(3)
+    golden = random.integers(5, 250, (100, 100, 4)).astype(np.uint8)
+    assert share_off(golden + np.uint8(1), golden) == 0
+    got = golden.copy()
+    got[:10, 1, 2] += 2
+    assert share_off(got, golden) == MOST_PIXELS_OFF
+    got[10, 1, 3] -= 2
+    assert share_off(got, golden) > MOST_PIXELS_OFF
