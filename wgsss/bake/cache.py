@@ -55,7 +55,7 @@ def cached(
     try:
         with np.load(path, allow_pickle=False) as entry:
             return {name: entry[name] for name in entry.files}
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         pass
     except Exception as error:  # a damaged file can fail in any way: bad zip, bad checksum, bad array header
         warnings.warn(f"{path}: damaged cache entry ({error}), made anew", stacklevel=2)

@@ -37,7 +37,7 @@ class Charts:
     """rgba16float: xyz the gradient of v, down"""
     ids: Any
     """r32uint: 0 unused; INSIDE | chart where a chart covers the texel's centre; seam + 1 in the gutter, the 3 texels
-    around a chart. The seam takes the texel's centre to a place where at least one of the four texels around is INSIDE"""
+    around a chart. The seam takes the texel's centre to a place where at least one of four texels around is INSIDE"""
     seams: Any
     """array<Seam> (wgsl/charts.wgsl)"""
 
@@ -103,7 +103,7 @@ def _make(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Arrays:
 
 
 def _clearance(ids: Array) -> Array:
-    """float (H, W): a lower bound of the distance in texels from each texel to the nearest one of no or another chart."""
+    """float (H, W): a lower bound of the distance in texels to the nearest texel of no or another chart."""
     from scipy.ndimage import distance_transform_edt
 
     padded = np.pad(np.where(ids >= INSIDE, ids, 0), 1)
@@ -135,7 +135,7 @@ def _leading_inside(ids: Array, maps: Array) -> Array:
     extra[:, :, :2] = maps[then][:, :, :2] @ first[:, :, :2]
     extra[:, :, 2] += np.einsum("nij,nj->ni", maps[then][:, :, :2], first[:, :, 2])
     off = ~_is_gutter(ids[y, x]) | ~_reaches_inside(ids, apply(extra, center))
-    if off.any():
+    if off.any() and (ids >= INSIDE).any():
         from scipy.ndimage import distance_transform_edt
 
         nearest = distance_transform_edt(ids < INSIDE, return_distances=False, return_indices=True)

@@ -22,7 +22,7 @@ class Seams:
     outward: Array
     """float64 (N,): +1 where the outside of the chart is to the left of the edge (in uv, v down), else -1"""
     maps: Array
-    """float64 (N, 2, 3): the affine map from texture coordinates beyond the edge to those of the neighbouring triangle"""
+    """float64 (N, 2, 3): the affine map from uv beyond the edge to the uv of the neighbouring triangle"""
 
 
 def find_seams(surface: Surface, roots: Array) -> Seams:

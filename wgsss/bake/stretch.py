@@ -18,16 +18,15 @@ Array = npt.NDArray[Any]
 class Stretch:
     """The atlas around each render vertex: a step d (mm) on the surface is the step root @ axes @ d in the atlas (uv).
 
-    The gradients of u and v on a face, as rows, are root @ axes, and with a root that is symmetric the axes are the
-    orthonormal pair nearest to the gradients. `root` is the symmetric square root of the inverse metric (J^T J)^-1, with J = [sigma_s sigma_t] the derivatives of
-    position by texture coordinate (eq. 43, 44); a texture area dA covers dA / det(root) mm^2.
+    `root` is the symmetric square root of the inverse metric (J^T J)^-1, with J = [sigma_s sigma_t] the derivatives of
+    position by texture coordinate (eq. 43, 44); a texture area dA covers dA / det(root) mm^2. `axes` are the directions
+    on the surface that its columns belong to: the orthonormal pair nearest to the gradients of u and v.
     """
 
     root: Array
     """float64 (R, 2, 2), uv per mm"""
     axes: Array
-    """float64 (R, 2, 3): means of orthonormal directions on the surface; root @ axes are the gradients of u and v where
-    the surface is flat, elsewhere once the axes are made orthonormal"""
+    """float64 (R, 2, 3): means over the faces around, so that they are to be made orthonormal again where these bend"""
 
 
 def stretch(mesh: Mesh, surface: Surface) -> Stretch:
@@ -47,10 +46,9 @@ def stretch(mesh: Mesh, surface: Surface) -> Stretch:
     weight = np.bincount(corner, np.repeat(areas, 3), count)
 
     def mean(values: Array) -> Array:
-        total = np.empty((count, *values.shape[1:]))
-        for index in np.ndindex(values.shape[1:]):
-            total[(slice(None), *index)] = np.bincount(corner, np.repeat(areas * values[(slice(None), *index)], 3), count)
-        return total / np.where(weight > 0, weight, 1).reshape(-1, *[1] * (values.ndim - 1))
+        columns = (areas[:, None] * values.reshape(len(values), -1)).repeat(3, axis=0).T
+        total = np.stack([np.bincount(corner, column, count) for column in columns], axis=-1)
+        return (total / np.where(weight > 0, weight, 1)[:, None]).reshape(count, *values.shape[1:])
 
     root = mean(roots)
     # Where all faces around are degenerate, nothing is drawn: any finite value does.

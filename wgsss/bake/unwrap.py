@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,8 @@ def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
         surface = _unwrap(gpu, mesh)
         return {f.name: getattr(surface, f.name) for f in fields(Surface)}
 
-    return Surface(**cached("unwrap", key, make, code=[Mesh, "bake/atlas_faces"], label=f"unwrapping {len(mesh.faces)} faces"))
+    label = f"unwrapping {len(mesh.faces)} faces"
+    return Surface(**cached("unwrap", key, make, code=[Mesh, "bake/atlas_faces"], label=label))
 
 
 def split(mesh: Mesh) -> Surface:
@@ -75,7 +76,7 @@ def _unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
 
 
 def _render_mesh(mesh: Mesh, atlas: Array | None) -> Surface:
-    """The mesh split where what is given per corner differs: the atlas (F, 3, 2), its own texture coordinates, normals."""
+    """The mesh split where what corners carry differs: the atlas (F, 3, 2), the mesh's own uvs, its normals."""
     corners = [a.reshape(-1, a.shape[-1]) for a in (atlas, mesh.corner_uvs, mesh.corner_normals) if a is not None]
     first, index = _distinct([mesh.faces.reshape(-1, 1), *corners])
     vertex = mesh.faces.reshape(-1)[first]
@@ -112,7 +113,8 @@ def is_unique(gpu: Gpu, mesh: Mesh, corner_uvs: Array) -> bool:
     ]  # fmt: skip
     graph.run(*drawn)
     last, first = (graph.read(handle) for handle in drawn)
-    return 0 < np.count_nonzero(last) and np.count_nonzero(last != first) <= MAX_SHARE * np.count_nonzero(last)
+    covered, overlapping = np.count_nonzero(last), np.count_nonzero(last != first)
+    return bool(covered and overlapping <= MAX_SHARE * covered)
 
 
 def _fitted(uvs: Array) -> Array:

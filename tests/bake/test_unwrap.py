@@ -1,0 +1,152 @@
+"""The render mesh and its atlas: when a file's texture coordinates serve, and what xatlas makes else."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from atlases import box, cylinder, icosphere, sheet
+
+from wgsss.bake.charts import INSIDE, charts
+from wgsss.bake.unwrap import Surface, is_unique, split, unwrap
+from wgsss.errors import InputError
+from wgsss.gpu import Gpu
+from wgsss.scene import Mesh
+from wgsss.scene.mesh import load_mesh
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Separate parts in one mesh."""
+    starts = np.cumsum([0, *(len(m.positions) for m in meshes)])
+    positions = np.concatenate([m.positions + np.array([0, 0, 100 * i]) for i, m in enumerate(meshes)])
+    faces = np.concatenate([m.faces + s for m, s in zip(meshes, starts[:-1], strict=True)])
+    return Mesh(positions, faces, corner_uvs=np.concatenate([m.corner_uvs for m in meshes]))
+
+
+def check(mesh: Mesh, surface: Surface) -> None:
+    """What holds for any render mesh."""
+    np.testing.assert_array_equal(surface.vertex[surface.faces], mesh.faces)
+    np.testing.assert_array_equal(surface.normals[surface.faces], mesh.shading_normals)
+    if mesh.corner_uvs is not None:
+        np.testing.assert_array_equal(surface.uvs[surface.faces], mesh.corner_uvs)
+    rows = np.concatenate([surface.vertex[:, None], surface.normals, surface.atlas, surface.uvs], axis=1)
+    assert len(np.unique(rows, axis=0)) == len(rows), "a vertex was split without need"
+    assert surface.atlas.min() >= 0
+    assert surface.atlas.max() <= 1
+    assert set(surface.charts) == set(range(surface.charts.max() + 1))
+    assert surface.faces.dtype == surface.charts.dtype == surface.vertex.dtype == np.int32
+    assert surface.atlas.dtype == surface.uvs.dtype == surface.normals.dtype == np.float32
+
+
+@pytest.mark.parametrize("make", [box, cylinder, lambda: sheet(0.03 * np.array([[1, 0.5], [0, -1]]))])
+def test_unique_coordinates_are_kept(gpu: Gpu, make: object) -> None:
+    mesh = make()  # type: ignore[operator]
+    surface = unwrap(gpu, mesh)
+    check(mesh, surface)
+    np.testing.assert_array_equal(surface.atlas[surface.faces], mesh.corner_uvs)
+    assert surface.charts.max() + 1 == {"box": 6, "cylinder": 1, "sheet": 1}[mesh.name]
+
+
+def test_hard_edges_split_normals_but_not_charts(gpu: Gpu) -> None:
+    mesh = sheet(np.eye(2) * 0.03, cells=2)
+    normals = np.broadcast_to(np.eye(3)[np.arange(len(mesh.faces)) % 3][:, None], (len(mesh.faces), 3, 3))
+    hard = Mesh(mesh.positions, mesh.faces, corner_uvs=mesh.corner_uvs, corner_normals=normals)
+    surface = unwrap(gpu, hard)
+    check(hard, surface)
+    assert len(surface.vertex) > len(mesh.positions)
+    assert surface.charts.max() == 0
+
+
+def test_split_only_splits(gpu: Gpu) -> None:
+    smooth = icosphere(10, 2)
+    surface = split(smooth)
+    assert len(surface.vertex) == len(smooth.positions)
+    check(smooth, surface)
+    check(box(), split(box()))
+    assert not split(box()).atlas.any()
+
+
+def test_overlaps_are_found(gpu: Gpu) -> None:
+    left, right = sheet(np.eye(2) * 0.02, center=(0.25, 0.5)), sheet(np.eye(2) * 0.02, center=(0.75, 0.5))
+    mirrored = sheet(np.diag([-0.02, 0.02]), center=(0.25, 0.5))
+    apart, twice, mirror = joined(left, right), joined(left, left), joined(left, mirrored)
+    assert is_unique(gpu, apart, apart.corner_uvs)
+    assert not is_unique(gpu, twice, twice.corner_uvs)
+    assert not is_unique(gpu, mirror, mirror.corner_uvs)
+    assert is_unique(gpu, mirrored, mirrored.corner_uvs)
+    little = sheet(np.eye(2) * 0.002, center=(0.25, 0.5))  # 1 % of the other's texels
+    overlapped = joined(left, little)
+    assert not is_unique(gpu, overlapped, overlapped.corner_uvs)
+    for mesh in (twice, mirror, overlapped):
+        surface = unwrap(gpu, mesh)
+        check(mesh, surface)
+        assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+
+
+def test_coordinates_without_area_do_not_serve(gpu: Gpu) -> None:
+    mesh = sheet(np.eye(2) * 0.03)
+    uvs = mesh.corner_uvs.copy()
+    uvs[0] = uvs[0, 0]
+    assert not is_unique(gpu, mesh, uvs)
+    assert not is_unique(gpu, mesh, np.full_like(uvs, 0.5))
+
+
+def test_coordinates_beyond_the_square_are_fitted(gpu: Gpu) -> None:
+    mesh = sheet(np.eye(2) * 0.2, center=(3, -1))
+    surface = unwrap(gpu, mesh)
+    check(mesh, surface)
+    assert surface.charts.max() == 0
+    np.testing.assert_allclose(surface.atlas.max(axis=0), 1)
+
+
+@pytest.mark.parametrize("radius", [20, 1e-3, 1e4])
+def test_sphere(gpu: Gpu, radius: float) -> None:
+    from scipy.ndimage import distance_transform_edt
+
+    mesh = icosphere(radius, 3)
+    surface = unwrap(gpu, mesh)
+    check(mesh, surface)
+    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+    count = surface.charts.max() + 1
+    assert count <= 16, "many small charts: the scale of the mesh must not matter"
+    ids = gpu.read_texture(charts(gpu, mesh, surface, 1024).ids)[..., 0]
+    assert (ids >= INSIDE).mean() > 0.4
+    for chart in range(count):
+        distance = distance_transform_edt(ids != (INSIDE | chart))
+        others = (ids >= INSIDE) & (ids != (INSIDE | chart))
+        assert distance[others].min() > 8
+
+
+def test_same_atlas_every_time(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = unwrap(gpu, icosphere(7, 3))
+    monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
+    np.testing.assert_array_equal(first.atlas, unwrap(gpu, icosphere(7, 3)).atlas)
+
+
+def test_faces_without_area(gpu: Gpu) -> None:
+    mesh = icosphere(10, 2)
+    with_sliver = Mesh(mesh.positions, np.concatenate([mesh.faces, [[0, 1, 1]]]))
+    surface = unwrap(gpu, with_sliver)
+    check(with_sliver, surface)
+    assert np.isfinite(gpu.read_texture(charts(gpu, with_sliver, surface, 128).gradient_u)).all()
+    with pytest.raises(InputError, match="no face has an area"):
+        unwrap(gpu, Mesh(np.eye(3) * [1, 2, 0], [[0, 1, 1]]))
+
+
+@pytest.mark.parametrize(
+    ("file", "faces", "own"),
+    [("lee_perry_smith/LeePerrySmith.obj", None, True), ("spot.obj", None, True), ("bunny_stanford.ply", 6000, False)],
+)
+def test_scans(gpu: Gpu, data: Path, file: str, faces: int | None, own: bool) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of repairs
+        mesh = load_mesh(data / file, size_mm=300).mesh
+    if faces:  # an open piece; all of it takes xatlas ten seconds
+        used, index = np.unique(mesh.faces[:faces], return_inverse=True)
+        mesh = Mesh(mesh.positions[used], index.reshape(-1, 3))
+    surface = unwrap(gpu, mesh)
+    check(mesh, surface)
+    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+    assert own == (mesh.corner_uvs is not None and surface.charts.max() < 20)
