@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from conftest import ROOT
 from PIL import Image as Picture
 
 from wgsss.cli import main
@@ -49,11 +50,11 @@ def wgsss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 Run = Callable[..., Said]
 
 
-def process(*argv: str, **options: object) -> subprocess.Popen[str]:
-    """The command as a process of its own."""
+def process(*argv: str, cwd: Path = ROOT, **environment: str) -> subprocess.Popen[str]:
+    """The command as a process of its own, from this checkout whatever the folder."""
     command = [sys.executable, "-m", "wgsss", *argv]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, **{**pipes, **options})  # type: ignore[call-overload, no-any-return]
+    env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    return subprocess.Popen(command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 # what there is
@@ -97,7 +98,7 @@ for argv in (["--help"], ["render", "--help"]):
         assert end.code == 0
 print([name for name in {HEAVY} if name in sys.modules])
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
     for word in ("render", "bake", "scenes", "methods", "materials", "info", f"default: {DEFAULT_METHOD}", "512x512"):
         assert word in done.stdout
@@ -112,7 +113,7 @@ from wgsss.render import Renderer
 assert all(getattr(wgsss, name) is not None for name in wgsss.__all__)
 assert callable(wgsss.render) and wgsss.Renderer is Renderer
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
 
 
@@ -273,8 +274,7 @@ def test_bad_input_is_one_line_and_no_file(wgsss: Run, tmp_path: Path, command: 
 @pytest.mark.parametrize("command", ["render", "bake", "info"])
 def test_no_adapter_is_one_line(tmp_path: Path, command: str) -> None:
     scene = [] if command == "info" else SMALL[:5]
-    env = {**os.environ, "VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
-    done = process(command, *scene, cwd=tmp_path, env=env)
+    done = process(command, *scene, cwd=tmp_path, VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
     out, err = done.communicate()
     assert err.startswith("wgsss: error: no Vulkan adapter found") and err.count("\n") == 1
     assert done.returncode == 2
