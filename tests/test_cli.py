@@ -138,8 +138,10 @@ def test_linear_files_hold_all_extra_outputs(wgsss: Run, tmp_path: Path) -> None
     assert wgsss("render", *SMALL, "-o", "a.exr").code == 0
     with OpenEXR.File("a.exr", separate_channels=True) as file:
         assert {name.split(".")[0] for name in file.channels()} == {"R", "G", "B", "A", *AOVS}
-        red = file.channels()["R"].pixels
+        red, header = file.channels()["R"].pixels, dict(file.header())
     np.testing.assert_array_equal(red, np.load("a.npy")[..., 0])
+    assert (header["wgsss.scene"], header["wgsss.method"], header["wgsss.exposure"]) == ("sphere", "lambert", "0")
+    assert header["Software"].startswith("wgsss ") and header["wgsss.adapter"]
 
 
 def test_json_says_what_was_made_and_how(wgsss: Run) -> None:

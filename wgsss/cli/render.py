@@ -52,7 +52,15 @@ def run(args: Any) -> None:
     start = time.perf_counter()
     renderer = Renderer(scene, method, args.size)
     ready = time.perf_counter()
-    frames = _frames(renderer, args, path)
+    made_by = {
+        "scene": scene.name,
+        "method": args.method,
+        "knobs": " ".join(f"{knob}={value}" for knob, value in vars(method).items()),
+        "adapter": renderer.gpu.name,
+        "exposure": f"{scene.exposure:g}",
+        "tone_map": scene.tone_map,
+    }
+    frames = (replace(image, metadata={**made_by, **image.metadata}) for image in _frames(renderer, args, path))
     written = save(next(frames), path) if args.frames == 1 else save_frames(frames, path, args.fps)
     done = time.perf_counter()
 
@@ -60,7 +68,7 @@ def run(args: Any) -> None:
         "files": [str(file) for file in written],
         "scene": scene.name,
         "method": args.method,
-        "knobs": {knob: getattr(method, knob) for knob, _ in args.knobs},
+        "knobs": vars(method),
         "size": args.size,
         "frames": args.frames,
         "adapter": renderer.gpu.name,
