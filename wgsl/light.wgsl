@@ -58,21 +58,28 @@ fn cube_face(d: vec3f) -> u32 {
 // texels, over which a plane's depth rises by that many texels times the tangent. More would let light leak.
 const LIFT_TEXELS: Number = 2.0;
 
-// The share of light that reaches x, filtered over 3 x 3 shadow texels by a tent.
-fn shadow(view: ShadowView, layer: u32, at: Incident, x: Position, n: Direction,
+// The share of light that reaches the parallelogram about x with sides dx and dy, at least a tent of 3 x 3 shadow texels.
+// Each lookup filters 2 x 2 of them; where the sides are long, there are up to 4 x 4 lookups.
+fn shadow(view: ShadowView, layer: u32, at: Incident, x: Position, n: Direction, dx: vec3f, dy: vec3f,
           shadow_maps: texture_depth_2d_array, compare_less: sampler_comparison) -> Number {
     let texel = view.texel * select(1.0, at.distance, view.perspective != 0u);
     let cosine = dot(n, at.direction);
     let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let lifted = x + n * (LIFT_TEXELS * texel * sine) + at.direction * (0.5 * texel);
-    let clip = view.world_to_clip * vec4f(lifted, 1.0);
-    let p = clip.xyz / clip.w;
-    let uv = vec2f(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y);
-    let half_texel = 0.5 / f32(textureDimensions(shadow_maps).x);
+    let middle = view.world_to_clip * vec4f(lifted, 1.0);
+    let along_x = view.world_to_clip * vec4f(dx, 0.0);
+    let along_y = view.world_to_clip * vec4f(dy, 0.0);
+    let texel_uv = 1.0 / f32(textureDimensions(shadow_maps).x);
+    let lookups = clamp(ceil(0.5 * max(length(dx), length(dy)) / texel), 2.0, 4.0);
     var lit = 0.0;
-    for (var i = 0u; i < 4u; i++) { // four bilinear lookups half a texel apart make the tent
-        let corner = vec2f(f32(i & 1u), f32(i >> 1u)) * 2.0 - 1.0;
-        lit += textureSampleCompareLevel(shadow_maps, compare_less, uv + corner * half_texel, layer, p.z);
+    for (var j = 0.5; j < lookups; j += 1.0) {
+        for (var i = 0.5; i < lookups; i += 1.0) {
+            let s = vec2f(i, j) / lookups - 0.5;
+            let clip = middle + s.x * along_x + s.y * along_y;
+            let p = clip.xyz / clip.w;
+            let uv = vec2f(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y) + 2.0 * texel_uv * s;
+            lit += textureSampleCompareLevel(shadow_maps, compare_less, uv, layer, p.z);
+        }
     }
-    return 0.25 * lit;
+    return lit / (lookups * lookups);
 }

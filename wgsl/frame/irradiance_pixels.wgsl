@@ -52,7 +52,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         var lit = 1.0;
         if light.views > 0u {
             let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
-            lit = shadow(views[layer], layer, at, x, n, shadow_maps, compare_less);
+            lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
         }
         total += transmitted(at, n, n_specular.w, lit, rho_dt_table);
     }

@@ -47,6 +47,8 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 @fragment
 fn fs(in: Varying) -> Texel {
     let x = in.position;
+    let dx = dpdx(x); // the texel's sides: what it holds is the mean over them, or a shadow's edge would move by half a texel
+    let dy = dpdy(x);
     let n = bent_normal(normalize(in.normal), x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
@@ -60,7 +62,7 @@ fn fs(in: Varying) -> Texel {
         var lit = 1.0;
         if light.views > 0u {
             let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
-            lit = shadow(views[layer], layer, at, x, n, shadow_maps, compare_less);
+            lit = shadow(views[layer], layer, at, x, n, dx, dy, shadow_maps, compare_less);
         }
         irradiance += transmitted(at, n, specular, lit, rho_dt_table);
     }

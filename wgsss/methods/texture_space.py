@@ -12,13 +12,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss.bake.charts import Charts, charts
+from wgsss.bake.charts import Charts
+from wgsss.bake.charts import charts as make_charts
 from wgsss.frame import Frame
-from wgsss.graph import Graph, Handle
+from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
 from wgsss.optics import SumOfGaussians, fit_gaussians
 from wgsss.stage import Body, Stage
 
+SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
+MOST_HALVINGS = 2  # smaller maps would lose whole charts
 _SLOTS = 6  # of wgsl/texture_space/gather.wgsl
 # The directions of a separable blur are undefined where the surface faces the axis that they turn about. With another
 # axis for each Gaussian, no place is undefined for all.
@@ -40,16 +43,21 @@ class TextureSpace:
     def bake(self, stage: Stage) -> None:
         """Unwrap each mesh and compute its stretch and seams; fit the Gaussians to each material's profile."""
         for body in stage.bodies:
-            self.charts(body)
-            self.profile(body)
+            for size in self.sizes(body):
+                atlas(body, size)
 
-    def charts(self, body: Body) -> Charts:
-        """The atlas of a body at this method's map size."""
-        surface = body.unwrap()
-        mesh, stage = body.rest.mesh, body.stage
-        return stage.shared(
-            ("charts", id(mesh), self.map_size), lambda: charts(stage.gpu, mesh, surface, self.map_size)
-        )
+    def sizes(self, body: Body) -> list[int]:
+        """The size of the map that each Gaussian is applied on: halved, at most twice, while its sigma spans enough
+        texels, since a blurred map has no detail to lose."""
+        surface, mesh = body.unwrap(), body.rest.mesh
+        corners = surface.atlas[surface.faces].astype(np.float64)
+        area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 2
+        uv_per_mm = np.sqrt(area / mesh.area)
+        found = []
+        for sigma in np.sqrt(self.profile(body).variances):
+            halvings = np.log2(max(sigma * uv_per_mm * self.map_size / SIGMA_TEXELS, 1.0))
+            found.append(max(self.map_size >> min(int(halvings), MOST_HALVINGS), 1))
+        return found
 
     def profile(self, body: Body) -> SumOfGaussians:
         """The sum of Gaussians of a body's material: its own where it has at most as many, else a fit."""
@@ -63,11 +71,9 @@ class TextureSpace:
     def passes(self, frame: Frame) -> Diffused:
         M_front: Any = None
         for body in frame.stage.bodies:
-            atlas, profile = self.charts(body), self.profile(body)
-            irradiance = shared.irradiance_texels(frame, body, self.map_size)
-            blurred = blurs(frame.graph, irradiance, atlas, profile)
             weights = np.zeros((_SLOTS, 4))
-            weights[: len(blurred), :3] = profile.weights
+            blurred = self.blurs(frame, body)
+            weights[: len(blurred), :3] = self.profile(body).weights
             maps: dict[str, Any] = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
             M_front = frame.graph.draw(
                 "texture_space/gather",
@@ -80,29 +86,33 @@ class TextureSpace:
             )
         return Diffused(M_front)
 
+    def blurs(self, frame: Frame, body: Body) -> list[Handle]:
+        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first."""
+        graph, full = frame.graph, atlas(body, self.map_size)
+        irradiance = shared.irradiance_texels(frame, body, self.map_size)
+        size = (self.map_size, self.map_size)
+        blurred = graph.draw("texture_space/dilate", size=size, source=irradiance, ids=full.ids, seams=full.seams)
+        found, reached = [], 0.0
+        for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, self.sizes(body), strict=True)):
+            charts = atlas(body, map_size)
+            for direction in (0, 1):
+                blurred = graph.draw(
+                    "texture_space/blur",
+                    size=(map_size, map_size),
+                    label=f"{variance:.3g} mm2 {'uv'[direction]}",
+                    params={"axis": _AXES[k % 3], "direction": direction, "variance": variance, "reached": reached},
+                    source=blurred,
+                    gradient_u=charts.gradient_u,
+                    gradient_v=charts.gradient_v,
+                    ids=charts.ids,
+                    seams=charts.seams,
+                )
+            reached = float(variance)
+            found.append(blurred)
+        return found
 
-def blurs(graph: Graph, irradiance: Handle, atlas: Charts, profile: SumOfGaussians) -> list[Handle]:
-    """The irradiance map blurred by each Gaussian of the profile, narrowest first."""
-    seams: dict[str, Any] = {"ids": atlas.ids, "seams": atlas.seams}
-    blurred = graph.draw("texture_space/dilate", source=irradiance, size=irradiance.size, **seams)
-    found, reached = [], 0.0
-    for k, variance in enumerate(profile.variances):
-        for direction in (0, 1):
-            params = {
-                "axis": _AXES[k % 3],
-                "direction": direction,
-                "sigma": np.sqrt(variance - reached),
-                "smooth_to": np.sqrt(reached),
-            }
-            blurred = graph.draw(
-                "texture_space/blur",
-                source=blurred,
-                gradient_u=atlas.gradient_u,
-                gradient_v=atlas.gradient_v,
-                params=params,
-                label=f"{variance:.3g} mm2 {'uv'[direction]}",
-                **seams,
-            )
-        reached = float(variance)
-        found.append(blurred)
-    return found
+
+def atlas(body: Body, size: int) -> Charts:
+    """A body's charts on maps of `size` texels a side."""
+    surface, mesh, stage = body.unwrap(), body.rest.mesh, body.stage
+    return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, surface, size))

@@ -1,0 +1,153 @@
+"""Texture-space diffusion against closed forms: a shadow's edge, uniform light, chart borders, vanishing width."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import MATTE, lit, plane
+
+from wgsss import frame as shared
+from wgsss.graph import Graph
+from wgsss.methods import Lambert, TextureSpace, texture_space
+from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
+from wgsss.render import Renderer
+from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, Object, OrthographicCamera
+from wgsss.scene.shapes import ear, slab, sphere
+from wgsss.stage import Stage
+
+SKIN = replace(MATTE, gaussians=SKIN_GAUSSIANS)
+DOWN = DirectionalLight((0, -1, 0), (1, 1, 1))
+ABOVE = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=16)
+# It looks under the shade from the lit side: along the image's rows, x is foreshortened by the root of 2.
+BESIDE = OrthographicCamera((50, 50, 0), (0, 0, 0), up=(0, 0, -1), height=10)
+SIZE = 256
+
+
+def half_shade(angle: float = 0.0) -> Object:
+    """Covers the half x < 0 of what lies below; turned by `angle` degrees about y."""
+    half = Mesh(plane(side=60.0).positions + np.float32([-30, 15, 0]), plane().faces)
+    return Object(half, MATTE, rotate=(0, angle, 0))
+
+
+def with_uvs(mesh: Mesh, angle: float, stretch: float) -> Mesh:
+    """The plane's texture coordinates turned and stretched, inside the unit square."""
+    a = np.radians(angle)
+    t = (mesh.corner_uvs - 0.5) @ np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    t = t * [1, 1 / stretch]
+    return replace(mesh, corner_uvs=(t / (2.05 * np.abs(t).max()) + 0.5).astype(np.float32))
+
+
+def edge_error(gpu, mesh, map_size, rotate=(0, 0, 0), angle=0.0):
+    """Largest difference from the step's convolution, of the total, along rows that cross the edge."""
+    scene = lit(DOWN, mesh=mesh, material=SKIN, camera=BESIDE)
+    scene = replace(scene, objects=(replace(scene.objects[0], rotate=rotate), half_shade(angle)))
+    renderer = Renderer(scene, TextureSpace(map_size=map_size), (SIZE, SIZE), gpu)
+    M = renderer.frame(aovs=["M_front"]).aovs["M_front"]
+    t = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * BESIDE.height
+    x, z = np.meshgrid(np.sqrt(2) * t, t)
+    a = np.radians(angle)
+    across = x * np.cos(a) - z * np.sin(a)
+    return np.abs(M - SKIN_GAUSSIANS.step_response(across)).max()
+
+
+@pytest.mark.parametrize("map_size", [512, 1024, 2048])
+def test_edge_on_the_slab(gpu, map_size):
+    top = slab(size=(40, 40, 4))
+    turned = Mesh(top.positions - np.float32([0, 0, 2]), top.faces, top.corner_normals, top.corner_uvs)
+    assert edge_error(gpu, turned, map_size, rotate=(-90, 0, 0)) < 0.01
+
+
+@pytest.mark.parametrize("stretch", [1, 4])
+@pytest.mark.parametrize("angle", [0, 30, 45, 100])
+def test_edge_with_any_chart_orientation_and_stretch(gpu, angle, stretch):
+    assert edge_error(gpu, with_uvs(plane(cells=4), angle, stretch), 1024) < 0.01
+
+
+@pytest.mark.parametrize("angle", [30, 45])
+def test_edge_at_an_angle_to_the_blurs(gpu, angle):
+    assert edge_error(gpu, plane(cells=4), 1024, angle=angle) < 0.01
+
+
+def diffused_map(gpu, scene, monkeypatch, map_size=512):
+    """M_front over the atlas, all of its Gaussians on maps of one size; the body and its charts."""
+    monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)
+    stage = Stage(gpu, scene)
+    method = TextureSpace(map_size=map_size)
+    method.bake(stage)
+    body = stage.bodies[0]
+    graph = Graph(gpu)
+    frame = shared.begin(graph, stage, (8, 8))
+    maps = method.blurs(frame, body)
+    graph.run(*maps)
+    M = sum(graph.read(m)[..., :3].astype(float) * w for m, w in zip(maps, SKIN_GAUSSIANS.weights, strict=True))
+    return M, body, texture_space.atlas(body, map_size)
+
+
+@pytest.mark.parametrize("mesh", [plane(), slab(), sphere(10.0, 2000), ear(2000)], ids=["plane", "slab", "sphere", "ear"])
+def test_uniform_light_stays_uniform(gpu, mesh, monkeypatch):
+    """Nothing is lost at borders, open ones included, nor added."""
+    M, _, charts = diffused_map(gpu, lit(EnvironmentLight((1, 1, 1)), mesh=mesh, material=SKIN), monkeypatch)
+    used = gpu.read_texture(charts.ids)[..., 0] > 0
+    np.testing.assert_allclose(M[used], np.pi * SKIN_GAUSSIANS.total[None].repeat(used.sum(), 0), rtol=4e-3)
+
+
+def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
+    """The light's terminator crosses the borders of xatlas' charts; sampled at the same point from both sides, M must
+    differ by no more than it does from texel to texel within a chart."""
+    from scipy.ndimage import map_coordinates
+
+    mesh = sphere(20.0, 4000)
+    scene = lit(DirectionalLight((-0.7, -0.5, -0.5), (1, 1, 1)), mesh=mesh, material=SKIN)
+    M, body, charts = diffused_map(gpu, scene, monkeypatch)
+    surface = body.unwrap()
+    ids = gpu.read_texture(charts.ids)[..., 0]
+    inside = ids >= 1 << 31
+    jumps = []
+    for axis in (0, 1):
+        same = inside & (np.roll(ids, -1, axis) == ids)
+        jumps.append(np.abs(np.roll(M, -1, axis) - M).max(axis=2)[same].max())
+    rows, columns = (surface.atlas[:, ::-1] * 512 - 0.5).T
+    at_vertex = np.stack([map_coordinates(M[..., c], [rows, columns], order=1) for c in range(3)], axis=1)
+    highest, lowest = np.full((len(mesh.positions), 3), -np.inf), np.full((len(mesh.positions), 3), np.inf)
+    np.maximum.at(highest, surface.vertex, at_vertex)
+    np.minimum.at(lowest, surface.vertex, at_vertex)
+    count = np.bincount(surface.vertex)
+    assert (count > 1).sum() > 50, "the sphere should have borders"
+    across = (highest - lowest)[count > 1].max()
+    assert across <= 2 * max(jumps), f"{across:.4f} across borders, {max(jumps):.4f} inside charts"
+
+
+def test_vanishing_width_is_lambert(gpu):
+    narrow = replace(MATTE, gaussians=SumOfGaussians(np.array([1e-8]), np.array([[0.9, 0.5, 0.1]])))
+    scene = lit(DirectionalLight((1, -1, 0.3), (1, 2, 3)), mesh=sphere(5.0, 3000), material=narrow, camera=replace(ABOVE, height=8))
+    blurred = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
+    sharp = Renderer(scene, Lambert(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
+    np.testing.assert_allclose(blurred, sharp, rtol=0.02, atol=0.02)
+
+
+def test_the_base_colour_may_be_applied_before_or_after(gpu):
+    """On a checker, colour after diffusion keeps its edge, colour before is blurred with the light; both keep the mean."""
+    checker = np.zeros((1, 2, 3), np.uint8)
+    checker[0, 0] = 255
+    wide = SumOfGaussians(np.array([4.0]), np.ones((1, 3)))
+    sides = {}
+    for share in (0.0, 1.0):
+        material = replace(MATTE, gaussians=wide, color_after=share, maps=replace(MATTE.maps, base_color=np.repeat(checker, 64, 1)))
+        scene = lit(DOWN, material=material, mesh=plane(cells=2), camera=ABOVE)
+        sides[share] = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"][32, :, 0]
+    assert np.abs(np.diff(sides[1.0])).max() > 0.4
+    assert np.abs(np.diff(sides[0.0])).max() < 0.1
+    assert sides[0.0].mean() == pytest.approx(sides[1.0].mean(), rel=0.02)
+
+
+def test_same_scene_same_bits(gpu):
+    scene = lit(DOWN, mesh=sphere(10.0, 1000), material=SKIN, camera=replace(ABOVE, height=24))
+    renderer = Renderer(scene, TextureSpace(map_size=128), (48, 48), gpu)
+    first = renderer.frame(timed=False)
+    for i in range(20):
+        if i % 10 == 9:  # a new stage and new buffers
+            renderer = Renderer(scene, TextureSpace(map_size=128), (48, 48), gpu)
+        again = renderer.frame(timed=bool(i % 2))
+        assert again.pixels.tobytes() == first.pixels.tobytes() and again.display.tobytes() == first.display.tobytes()
