@@ -18,7 +18,7 @@ from pathlib import Path
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.methods import METHODS, make_method
-from wgsss.render import Renderer
+from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 
 SIZE = (512, 512)

@@ -20,7 +20,7 @@ from PIL import Image as Picture
 
 from wgsss.cli import main
 from wgsss.methods import METHODS
-from wgsss.render import AOVS, DEFAULT_METHOD
+from wgsss.rendering import AOVS, DEFAULT_METHOD
 from wgsss.scene import MATERIALS
 from wgsss.scene.builtin import SCENES
 
@@ -109,7 +109,7 @@ def test_import_needs_nothing_heavy_and_offers_what_it_lists() -> None:
 import sys, wgsss
 print([name for name in {HEAVY} if name in sys.modules])
 assert "render" in dir(wgsss) and not hasattr(wgsss, "rendr")
-from wgsss.render import Renderer
+from wgsss.rendering import Renderer
 assert all(getattr(wgsss, name) is not None for name in wgsss.__all__)
 assert callable(wgsss.render) and wgsss.Renderer is Renderer
 """

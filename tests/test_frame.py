@@ -12,7 +12,7 @@ from wgsss import frame as shared
 from wgsss.bake.environment import rho_dt_table
 from wgsss.graph import Graph
 from wgsss.methods import make_method
-from wgsss.render import AOVS, Renderer
+from wgsss.rendering import AOVS, Renderer
 from wgsss.scene import (
     DirectionalLight,
     EnvironmentLight,

@@ -21,7 +21,7 @@ from PIL import Image as Picture
 from wgsss.gpu import Gpu
 from wgsss.methods import METHODS, make_method
 from wgsss.output import save
-from wgsss.render import Image, Renderer
+from wgsss.rendering import Image, Renderer
 from wgsss.scene import Scene, load_scene
 from wgsss.scene.builtin import SCENES
 

@@ -13,9 +13,9 @@ import OpenEXR
 import pytest
 from PIL import Image as Picture
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, RenderError
 from wgsss.output import check_output, replacing, save, save_frames
-from wgsss.render import Image, RenderError
+from wgsss.rendering import Image
 
 WIDTH, HEIGHT = 7, 5  # odd, and not square
 

@@ -11,16 +11,14 @@ Names are imported when first used, so that `import wgsss` costs next to nothing
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wgsss.errors import InputError
+    from wgsss.errors import InputError, RenderError
     from wgsss.methods import METHODS
     from wgsss.output import save
-    from wgsss.render import AOVS, Image, Renderer, RenderError, render
+    from wgsss.rendering import AOVS, Image, Renderer, render
     from wgsss.scene import (
         MATERIALS,
         DirectionalLight,
@@ -72,10 +70,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    "wgsss.errors": {"InputError"},
+    "wgsss.errors": {"InputError", "RenderError"},
     "wgsss.methods": {"METHODS"},
     "wgsss.output": {"save"},
-    "wgsss.render": {"AOVS", "Image", "RenderError", "Renderer", "render"},
+    "wgsss.rendering": {"AOVS", "Image", "Renderer", "render"},
 }
 
 
@@ -86,17 +84,6 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(home), name)
     globals()[name] = value
     return value
-
-
-class _Package(ModuleType):
-    """Keeps `wgsss.render` the function, over which an import of the module `wgsss.render` would bind that module."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name != "render" or not isinstance(value, ModuleType):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 
 def __dir__() -> list[str]:

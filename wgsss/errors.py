@@ -10,6 +10,10 @@ class InputError(ValueError):
     """Bad input. Its message is one line that says what is wrong and where; commands print it and exit with 2."""
 
 
+class RenderError(RuntimeError):
+    """A fault of the renderer or the driver, not of the input: one line; commands print it and exit with 1."""
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """An error for a name that is not among those known, suggesting the nearest one."""
     known = sorted(known)

@@ -178,9 +178,15 @@ class Gpu:
         """The texels of a texture: (height, width, channels), with a leading axis of layers where there are several."""
         scalar, channels = FORMATS[texture.format]
         width, height, layers = texture.size
-        layout = {"bytes_per_row": width * texel_bytes(texture.format), "rows_per_image": height}
-        raw = self.queue.read_texture({"texture": texture}, layout, texture.size)
-        texels = np.frombuffer(raw, scalar).reshape(layers, height, width, channels)
+        row = width * texel_bytes(texture.format)
+        strip = min(height, LIMITS["max-buffer-size"] // (row + 256))  # rows that fit in one staging buffer
+        texels = np.empty((layers, height, width, channels), scalar)
+        for layer, top in ((i, y) for i in range(layers) for y in range(0, height, strip)):
+            rows = min(strip, height - top)
+            source = {"texture": texture, "origin": (0, top, layer)}
+            layout = {"bytes_per_row": row, "rows_per_image": rows}
+            raw = self.queue.read_texture(source, layout, (width, rows, 1))
+            texels[layer, top : top + rows] = np.frombuffer(raw, scalar).reshape(rows, width, channels)
         return texels[0] if layers == 1 else texels
 
     def fence(self) -> None:

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import __version__
-from wgsss.errors import InputError
+from wgsss.errors import InputError, RenderError
 
 if TYPE_CHECKING:
-    from wgsss.render import Image
+    from wgsss.rendering import Image
 
 Array = npt.NDArray[Any]
 
@@ -123,8 +123,6 @@ def save_frames(images: Iterable[Image], path: str | Path, fps: float = DEFAULT_
 
 def _layers(image: Image) -> dict[str, Array]:
     """The extra outputs, fit to be written. Raises RenderError where one, or the image, is not finite."""
-    from wgsss.render import RenderError
-
     layers = dict(image.aovs)
     if "depth" in layers:
         layers["depth"] = np.where(image.pixels[..., 3:] > 0, layers["depth"], 0.0)

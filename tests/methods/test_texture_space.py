@@ -12,7 +12,7 @@ from wgsss import frame as shared
 from wgsss.graph import Graph
 from wgsss.methods import Lambert, TextureSpace, texture_space
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
-from wgsss.render import Renderer
+from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, Object, OrthographicCamera
 from wgsss.scene.shapes import ear, slab, sphere
 from wgsss.stage import Stage
@@ -85,7 +85,9 @@ def diffused_map(gpu, scene, monkeypatch, map_size=512):
     return M, body, texture_space.atlas(body, map_size)
 
 
-@pytest.mark.parametrize("mesh", [plane(), slab(), sphere(10.0, 2000), ear(2000)], ids=["plane", "slab", "sphere", "ear"])
+@pytest.mark.parametrize(
+    "mesh", [plane(), slab(), sphere(10.0, 2000), ear(2000)], ids=["plane", "slab", "sphere", "ear"]
+)
 def test_uniform_light_stays_uniform(gpu, mesh, monkeypatch):
     """Nothing is lost at borders, open ones included, nor added."""
     M, _, charts = diffused_map(gpu, lit(EnvironmentLight((1, 1, 1)), mesh=mesh, material=SKIN), monkeypatch)
@@ -121,22 +123,30 @@ def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
 
 def test_vanishing_width_is_lambert(gpu):
     narrow = replace(MATTE, gaussians=SumOfGaussians(np.array([1e-8]), np.array([[0.9, 0.5, 0.1]])))
-    scene = lit(DirectionalLight((1, -1, 0.3), (1, 2, 3)), mesh=sphere(5.0, 3000), material=narrow, camera=replace(ABOVE, height=8))
+    scene = lit(
+        DirectionalLight((1, -1, 0.3), (1, 2, 3)),
+        mesh=sphere(5.0, 3000),
+        material=narrow,
+        camera=replace(ABOVE, height=8),
+    )
     blurred = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
     sharp = Renderer(scene, Lambert(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
     np.testing.assert_allclose(blurred, sharp, rtol=0.02, atol=0.02)
 
 
 def test_the_base_colour_may_be_applied_before_or_after(gpu):
-    """On a checker, colour after diffusion keeps its edge, colour before is blurred with the light; both keep the mean."""
-    checker = np.zeros((1, 2, 3), np.uint8)
-    checker[0, 0] = 255
+    """On a checker, colour after diffusion keeps its edge, colour before is blurred; both keep the mean."""
+    checker = np.zeros((1, 128, 3), np.uint8)
+    checker[0, :64] = 255
     wide = SumOfGaussians(np.array([4.0]), np.ones((1, 3)))
     sides = {}
     for share in (0.0, 1.0):
-        material = replace(MATTE, gaussians=wide, color_after=share, maps=replace(MATTE.maps, base_color=np.repeat(checker, 64, 1)))
+        material = replace(
+            MATTE, gaussians=wide, color_after=share, maps=replace(MATTE.maps, base_color=np.repeat(checker, 64, 1))
+        )
         scene = lit(DOWN, material=material, mesh=plane(cells=2), camera=ABOVE)
-        sides[share] = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"][32, :, 0]
+        image = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"])
+        sides[share] = image.aovs["M_front"][32, :, 0]
     assert np.abs(np.diff(sides[1.0])).max() > 0.4
     assert np.abs(np.diff(sides[0.0])).max() < 0.1
     assert sides[0.0].mean() == pytest.approx(sides[1.0].mean(), rel=0.02)

@@ -14,7 +14,7 @@ from typing import Any
 from wgsss import __version__
 from wgsss.cli import bake, catalogue, info, render
 from wgsss.cli.arguments import Parser
-from wgsss.errors import InputError, unknown
+from wgsss.errors import InputError, RenderError, unknown
 
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as shells report them
 
@@ -35,11 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever read our output has gone; what is still buffered must not fail again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
-    except RuntimeError as error:
-        from wgsss.render import RenderError
-
-        if not isinstance(error, RenderError):
-            raise
+    except RenderError as error:
         return _say("error", error, 1)
 
 

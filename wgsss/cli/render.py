@@ -12,7 +12,7 @@ from wgsss.cli import arguments
 
 if TYPE_CHECKING:
     from wgsss.graph import Graph
-    from wgsss.render import Image, Renderer
+    from wgsss.rendering import Image, Renderer
 
 _OUTPUT = """.png or .mp4, tone mapped; .exr or .npy, linear, with all extra outputs (default: SCENE.png). Several
 frames become one .mp4, or files with numbers"""
@@ -40,7 +40,7 @@ def run(args: Any) -> None:
     from dataclasses import replace
 
     from wgsss.output import check_output, replacing, save, save_frames
-    from wgsss.render import Renderer
+    from wgsss.rendering import Renderer
 
     path = check_output(args.output or Path(f"{Path(args.scene).stem}.png"))
     dot = args.graph_out and check_output(args.graph_out, (".dot",))
@@ -52,15 +52,7 @@ def run(args: Any) -> None:
     start = time.perf_counter()
     renderer = Renderer(scene, method, args.size)
     ready = time.perf_counter()
-    made_by = {
-        "scene": scene.name,
-        "method": args.method,
-        "knobs": " ".join(f"{knob}={value}" for knob, value in vars(method).items()),
-        "adapter": renderer.gpu.name,
-        "exposure": f"{scene.exposure:g}",
-        "tone_map": scene.tone_map,
-    }
-    frames = (replace(image, metadata={**made_by, **image.metadata}) for image in _frames(renderer, args, path))
+    frames = _frames(renderer, args, path)
     written = save(next(frames), path) if args.frames == 1 else save_frames(frames, path, args.fps)
     done = time.perf_counter()
 
@@ -94,7 +86,7 @@ def _times(args: Any) -> list[float]:
 
 def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
     from wgsss.output import LINEAR_FORMATS
-    from wgsss.render import AOVS
+    from wgsss.rendering import AOVS
 
     aovs = AOVS if path.suffix.lower() in LINEAR_FORMATS else ()
     times: Any = _times(args)

@@ -85,7 +85,9 @@ def leaf(vertices: int | None = None) -> Scene:
     """a green leaf with veins against the sun"""
     blade = Object(shapes.leaf(vertices), LEAF, rotate=(0, 0, -24))
     sun = DirectionalLight(direction=(-0.25, -0.4, 0.88), irradiance=(9.0, 8.8, 8.2))
-    shine = DirectionalLight(direction=(0.9, -0.35, -0.3), irradiance=(1.5, 1.6, 1.8))  # from the side: the veins stand out
+    shine = DirectionalLight(
+        direction=(0.9, -0.35, -0.3), irradiance=(1.5, 1.6, 1.8)
+    )  # from the side: the veins stand out
     sky = EnvironmentLight((0.25, 0.30, 0.38))
     return Scene("leaf", (blade,), (sun, shine, sky), _framing([blade], azimuth=20, elevation=5))
 

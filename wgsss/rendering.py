@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import frame as shared
-from wgsss.errors import InputError, unknown
+from wgsss.errors import InputError, RenderError, unknown
 from wgsss.gpu import LIMITS, Gpu, default_gpu
 from wgsss.graph import Graph, Handle
-from wgsss.methods import Method, make_method
+from wgsss.methods import METHODS, Method, make_method
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 
@@ -21,10 +21,6 @@ Array = npt.NDArray[Any]
 
 AOVS = ("irradiance", "M_front", "M_back", "specular", "depth", "normal")
 DEFAULT_METHOD = "deon07"
-
-
-class RenderError(RuntimeError):
-    """A fault of the renderer or the driver, not of the input: its message is one line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +35,7 @@ class Image:
             `normal` (world space).
         timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run includes its compilation.
         graph: the frame's graph, for `str` and `dot`.
-        metadata: what made the image: method, knobs, adapter, version.
+        metadata: what made the image, in words: scene, method, knobs, adapter, exposure, tone_map, time_s.
     """
 
     pixels: Array
@@ -100,7 +96,19 @@ class Renderer:
             if bad.any():
                 y, x = np.argwhere(bad)[0]
                 raise RenderError(f"{int(bad.sum())} pixels of {name} are not finite, the first at x {x}, y {y}")
-        return Image(pixels, graph.read(display), found, graph.times, graph.clock, graph)
+        return Image(pixels, graph.read(display), found, graph.times, graph.clock, graph, self._metadata())
+
+    def _metadata(self) -> dict[str, str]:
+        scene, method = self.stage.scene, self.method
+        return {
+            "scene": scene.name,
+            "method": next((name for name, kind in METHODS.items() if kind is type(method)), type(method).__name__),
+            "knobs": " ".join(f"{knob}={value}" for knob, value in vars(method).items()),
+            "adapter": self.gpu.name,
+            "exposure": f"{scene.exposure:g}",
+            "tone_map": scene.tone_map,
+            "time_s": f"{self.stage.time_s:g}",
+        }
 
     def _aov(self, graph: Graph, frame: shared.Frame, name: str, handle: Handle | None) -> Array:
         width, height = self.size
