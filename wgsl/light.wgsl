@@ -58,26 +58,35 @@ fn cube_face(d: vec3f) -> u32 {
 // texels, over which a plane's depth rises by that many texels times the tangent. More would let light leak.
 const LIFT_TEXELS: Number = 2.0;
 
+// A side of the area filtered, in the view's normalised coordinates: that of `side` (mm), and at least two texels, the
+// reach of a lookup, if need be along `otherwise`. `texels` is the size of the map, -1 to 1 in these coordinates.
+fn side_of_filter(view: ShadowView, side: vec3f, at: vec3f, w: f32, otherwise: vec3f, texels: f32) -> vec3f {
+    let clip = view.world_to_clip * vec4f(side, 0.0);
+    let d = (clip.xyz - at * clip.w) / w;
+    let size = length(d.xy);
+    let least = 4.0 / texels;
+    return select(d * max(1.0, least / max(size, 1e-9)), least * otherwise, size < 1e-6);
+}
+
 // The share of light that reaches the parallelogram about x with sides dx and dy, at least a tent of 3 x 3 shadow texels.
-// Each lookup filters 2 x 2 of them; where the sides are long, there are up to 4 x 4 lookups.
+// Each lookup filters 2 x 2 of them, and they are at most 1.5 apart as long as 4 x 4 lookups reach.
 fn shadow(view: ShadowView, layer: u32, at: Incident, x: Position, n: Direction, dx: vec3f, dy: vec3f,
           shadow_maps: texture_depth_2d_array, compare_less: sampler_comparison) -> Number {
     let texel = view.texel * select(1.0, at.distance, view.perspective != 0u);
     let cosine = dot(n, at.direction);
     let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let lifted = x + n * (LIFT_TEXELS * texel * sine) + at.direction * (0.5 * texel);
-    let middle = view.world_to_clip * vec4f(lifted, 1.0);
-    let along_x = view.world_to_clip * vec4f(dx, 0.0);
-    let along_y = view.world_to_clip * vec4f(dy, 0.0);
-    let texel_uv = 1.0 / f32(textureDimensions(shadow_maps).x);
-    let lookups = clamp(ceil(0.5 * max(length(dx), length(dy)) / texel), 2.0, 4.0);
+    let clip = view.world_to_clip * vec4f(lifted, 1.0);
+    let middle = clip.xyz / clip.w;
+    let texels = f32(textureDimensions(shadow_maps).x);
+    let across = side_of_filter(view, dx, middle, clip.w, vec3f(1.0, 0.0, 0.0), texels);
+    let along = side_of_filter(view, dy, middle, clip.w, vec3f(0.0, 1.0, 0.0), texels);
+    let lookups = clamp(ceil(texels * max(length(across.xy), length(along.xy)) / 3.0), 2.0, 4.0);
     var lit = 0.0;
     for (var j = 0.5; j < lookups; j += 1.0) {
         for (var i = 0.5; i < lookups; i += 1.0) {
-            let s = vec2f(i, j) / lookups - 0.5;
-            let clip = middle + s.x * along_x + s.y * along_y;
-            let p = clip.xyz / clip.w;
-            let uv = vec2f(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y) + 2.0 * texel_uv * s;
+            let p = middle + (i / lookups - 0.5) * across + (j / lookups - 0.5) * along;
+            let uv = vec2f(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y);
             lit += textureSampleCompareLevel(shadow_maps, compare_less, uv, layer, p.z);
         }
     }

@@ -6,15 +6,16 @@
 // neighbour's, as the seams unfold it.
 
 import package::units::{Area};
-import package::charts::{INSIDE, Seam, across};
+import package::charts::{INSIDE, Seam, across, id_at, settled};
 import package::screen::{screen_corner};
 import package::targets::{RGBA16Float};
 
 struct Params {
     axis: vec3f,      // the first direction is across it
     direction: u32,   // 0 or 1
-    variance: Area,   // of the Gaussian, from the irradiance on
-    reached: Area,    // the variance that the source has already
+    variance: Area,   // of the Gaussian
+    reached: Area,    // of the last one, which the source has been blurred by; 0 for the irradiance
+    finer: f32,       // texels of the source per texel of what is drawn
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -31,7 +32,9 @@ struct Texel {
 
 const REACH: f32 = 3.0;       // sigmas to each side: 99.7 % of the Gaussian, and the weights are normalised
 const SPACING: f32 = 1.5;     // sigmas of the source's own blur from tap to tap: ripples stay below 1e-3
-const TEXEL_VARIANCE: f32 = 0.25; // texels^2 that a map blurs by itself: a box for its texels, a tent for their filter
+const SPLINE: f32 = 1.0 / 3.0; // variance in texels^2 of the spline that the result is read through (gather.wgsl)
+const BOX: f32 = 1.0 / 12.0;   // of a texel of the irradiance, which holds the mean over its area
+const HALVING: f32 = 0.25;     // of reading a larger map between its texels
 const MAX_TAPS: f32 = 64.0;   // to each side
 const MAX_CROSSINGS: u32 = 4u;
 const BISECTIONS: u32 = 6u;   // of a step of up to 64 texels, to one texel
@@ -41,56 +44,33 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return screen_corner(i);
 }
 
-fn id_at(uv: vec2f, size: vec2f) -> u32 {
-    return textureLoad(ids, vec2u(clamp(uv * size, vec2f(0.0), size - 1.0)), 0).r;
-}
-
-// A place across a seam may lie in the rim of its chart where no texel's centre is covered: the nearest that is.
-fn settled(uv: vec2f, size: vec2f) -> vec2f {
-    if (id_at(uv, size) & INSIDE) != 0u {
-        return uv;
-    }
-    let corner = floor(uv * size - 0.5) + 0.5;
-    var best = uv;
-    var nearest = 9.0;
-    for (var i = 0u; i < 4u; i++) {
-        let texel = corner + vec2f(f32(i & 1u), f32(i >> 1u));
-        let d = distance(texel, uv * size);
-        if d < nearest && (id_at(texel / size, size) & INSIDE) != 0u {
-            nearest = d;
-            best = texel / size;
-        }
-    }
-    return best;
-}
-
 // Where one gets from `start`, inside a chart, by walking `step` over the surface.
-fn walk(start: vec2f, step: vec2f, size: vec2f) -> vec2f {
+fn walk(start: vec2f, step: vec2f) -> vec2f {
     var a = start;
     var b = start + step;
     for (var i = 0u; i < MAX_CROSSINGS; i++) {
-        let chart = id_at(a, size);
-        if id_at(b, size) == chart {
+        let chart = id_at(ids, a);
+        if id_at(ids, b) == chart {
             return b;
         }
         var inside = 0.0; // the crossing, by bisection
         var outside = 1.0;
         for (var k = 0u; k < BISECTIONS; k++) {
             let middle = 0.5 * (inside + outside);
-            if id_at(mix(a, b, middle), size) == chart {
+            if id_at(ids, mix(a, b, middle)) == chart {
                 inside = middle;
             } else {
                 outside = middle;
             }
         }
-        let id = id_at(mix(a, b, outside), size);
+        let id = id_at(ids, mix(a, b, outside));
         if id == 0u || (id & INSIDE) != 0u { // no seam is known there: stay at the border
             return mix(a, b, inside);
         }
         let seam = seams[id - 1u];
-        a = settled(across(seam, mix(a, b, outside)), size);
+        a = settled(ids, across(seam, mix(a, b, outside)));
         b = across(seam, b);
-        if (id_at(a, size) & INSIDE) == 0u { // the neighbour is thinner than a texel
+        if (id_at(ids, a) & INSIDE) == 0u { // the neighbour is thinner than a texel
             return a;
         }
     }
@@ -103,7 +83,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     let id = textureLoad(ids, vec2u(pixel.xy), 0).r;
     var home = pixel.xy / size;
     if id != 0u && (id & INSIDE) == 0u { // a texel of the gutter is one of the neighbour's
-        home = settled(across(seams[id - 1u], home), size);
+        home = settled(ids, across(seams[id - 1u], home));
     }
     let u = textureLoad(gradient_u, vec2u(clamp(home * size, vec2f(0.0), size - 1.0)), 0);
     let v = textureLoad(gradient_v, vec2u(clamp(home * size, vec2f(0.0), size - 1.0)), 0);
@@ -115,10 +95,15 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     }
     let texels_per_mm = vec2f(dot(u.xyz, e), dot(v.xyz, e));
     let scale = length(texels_per_mm);
-    let reached = max(params.reached, TEXEL_VARIANCE / (scale * scale));
-    let variance = params.variance - reached;
-    let spacing = max(1.0 / scale, SPACING * sqrt(reached));
-    let exponent = -0.5 * spacing * spacing / variance;
+    let texel = 1.0 / scale;
+    let source_texel = texel / params.finer;
+    let own = BOX + select(0.0, HALVING, params.finer > 1.0);
+    let reached = max(params.reached - SPLINE * source_texel * source_texel, 0.0) + own * source_texel * source_texel;
+    let variance = params.variance - SPLINE * texel * texel - reached;
+    let spacing = max(source_texel, SPACING * sqrt(reached));
+    let spread = variance / (spacing * spacing);
+    // Samples of a Gaussian much narrower than their spacing have less variance than it: three that have as much.
+    let exponent = select(-0.5 / spread, log(0.5 * spread / (1.0 - spread)), spread < 0.25);
     var taps = 0.0; // where nothing is drawn, or the Gaussian is narrower than a texel
     if id != 0u && variance > 0.0 {
         taps = clamp(ceil(REACH * sqrt(variance) / spacing), 1.0, MAX_TAPS);
@@ -136,8 +121,8 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     for (; k <= taps; k += 1.0) {
         let weight = exp(exponent * k * k);
         let step = texels_per_mm * (spacing * k / size);
-        total += weight * textureSampleLevel(source, linear_clamp, walk(home, step, size), 0.0);
-        total += weight * textureSampleLevel(source, linear_clamp, walk(home, -step, size), 0.0);
+        total += weight * textureSampleLevel(source, linear_clamp, walk(home, step), 0.0);
+        total += weight * textureSampleLevel(source, linear_clamp, walk(home, -step), 0.0);
     }
     if id == 0u {
         discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours

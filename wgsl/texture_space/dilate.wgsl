@@ -1,7 +1,7 @@
 // Fills the texels around the charts from where they lie on the surface: across the border, in the chart of the
 // neighbouring triangle (Mikkelsen 2009, 3.4, offsets determined once, applied in a single pass).
 
-import package::charts::{INSIDE, Seam, across};
+import package::charts::{INSIDE, Seam, across, settled};
 import package::screen::{screen_corner};
 import package::targets::{RGBA16Float};
 
@@ -28,7 +28,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     }
     var value = textureLoad(source, texel, 0);
     if (id & INSIDE) == 0u {
-        let home = across(seams[id - 1u], pixel.xy / vec2f(textureDimensions(ids)));
+        let home = settled(ids, across(seams[id - 1u], pixel.xy / vec2f(textureDimensions(ids))));
         value = textureSampleLevel(source, linear_clamp, home, 0.0);
     }
     // Alpha is coverage: beside a border the filter has met texels that nothing has drawn.

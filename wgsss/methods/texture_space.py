@@ -95,12 +95,13 @@ class TextureSpace:
         found, reached = [], 0.0
         for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, self.sizes(body), strict=True)):
             charts = atlas(body, map_size)
+            widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size}
             for direction in (0, 1):
                 blurred = graph.draw(
                     "texture_space/blur",
                     size=(map_size, map_size),
                     label=f"{variance:.3g} mm2 {'uv'[direction]}",
-                    params={"axis": _AXES[k % 3], "direction": direction, "variance": variance, "reached": reached},
+                    params={"axis": _AXES[k % 3], "direction": direction, **widths},
                     source=blurred,
                     gradient_u=charts.gradient_u,
                     gradient_v=charts.gradient_v,
