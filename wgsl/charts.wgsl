@@ -7,6 +7,7 @@ const INSIDE: u32 = 0x80000000u; // of a texel id: inside a chart, whose number 
 struct Seam {
     to_u: vec3f, // u' = dot(to_u, (u, v, 1))
     to_v: vec3f,
+    chart: u32,   // that it leads out of
 }
 
 fn across(seam: Seam, uv: vec2f) -> vec2f {

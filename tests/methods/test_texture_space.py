@@ -14,7 +14,7 @@ from wgsss.methods import Lambert, TextureSpace, texture_space
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.rendering import Renderer
 from wgsss.scene import MATERIALS, DirectionalLight, EnvironmentLight, Mesh, Object, OrthographicCamera
-from wgsss.scene.shapes import ear, slab, sphere
+from wgsss.scene.shapes import capsule, ear, slab, sphere
 from wgsss.stage import Stage
 
 SKIN = replace(MATTE, gaussians=SKIN_GAUSSIANS)
@@ -127,6 +127,18 @@ def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
     assert (count > 1).sum() > 50, "the sphere should have borders"
     across = (highest - lowest)[count > 1].max()
     assert across <= 2 * max(jumps), f"{across:.4f} across borders, {max(jumps):.4f} inside charts"
+
+
+def test_wide_blurs_find_their_way_over_jagged_borders(gpu):
+    """Along a cylinder that is lit from the side nothing changes, though xatlas cuts it into strips with teeth."""
+    wide = replace(MATTE, gaussians=SumOfGaussians(np.array([0.2, 9.0]), np.array([[0.3] * 3, [0.6] * 3])))
+    camera = OrthographicCamera((0, 0, 50), (0, 0, 0), height=24)
+    rod = capsule(length=80.0, radius=9.0, vertices=3000)
+    rod = rod.deformed(rod.positions - np.float32([0, rod.bounds.mean(axis=0)[1], 0]))
+    scene = lit(DirectionalLight((-1, 0, -0.2), (1, 1, 1)), mesh=rod, material=wide, camera=camera)
+    M = Renderer(scene, TextureSpace(map_size=1024), (96, 96), gpu).frame(aovs=["M_front"]).aovs["M_front"]
+    inside = M[:, 20:76, 0]  # away from the silhouette, where a pixel sees several millimetres
+    assert np.abs(inside - inside.mean(axis=0)).max() < 0.01
 
 
 def test_vanishing_width_is_lambert(gpu):

@@ -36,45 +36,58 @@ const SPLINE: f32 = 1.0 / 3.0; // variance in texels^2 of the spline that the re
 const BOX: f32 = 1.0 / 12.0;   // of a texel of the irradiance, which holds the mean over its area
 const HALVING: f32 = 0.25;     // of reading a larger map between its texels
 const MAX_TAPS: f32 = 64.0;   // to each side
-const MAX_CROSSINGS: u32 = 4u;
-const BISECTIONS: u32 = 6u;   // of a step of up to 64 texels, to one texel
+const MAX_CROSSINGS: u32 = 6u;
+const BISECTIONS: u32 = 8u;   // to a texel, of a step of up to 256
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return screen_corner(i);
 }
 
+// Whether a place is in the gutter of a chart, given by its id; what charts that are close have between them is the
+// gutter of the nearer one.
+fn leads_out_of(chart: u32, uv: vec2f) -> bool {
+    let id = id_at(ids, uv);
+    return id != 0u && (id & INSIDE) == 0u && (INSIDE | seams[max(id, 1u) - 1u].chart) == chart;
+}
+
 // Where one gets from `start`, inside a chart, by walking `step` over the surface.
 fn walk(start: vec2f, step: vec2f) -> vec2f {
+    let size = vec2f(textureDimensions(ids));
     var a = start;
     var b = start + step;
     for (var i = 0u; i < MAX_CROSSINGS; i++) {
         let chart = id_at(ids, a);
-        if id_at(ids, b) == chart {
-            return b;
+        let end = id_at(ids, b);
+        if end == chart || chart == 0u {
+            break;
         }
-        var inside = 0.0; // the crossing, by bisection
-        var outside = 1.0;
-        for (var k = 0u; k < BISECTIONS; k++) {
-            let middle = 0.5 * (inside + outside);
-            if id_at(ids, mix(a, b, middle)) == chart {
-                inside = middle;
-            } else {
-                outside = middle;
+        var seam_id = chart;
+        if (chart & INSIDE) != 0u { // else `a` is at a corner, in the gutter of the chart that it was led to
+            var inside = 0.0; // the crossing, by bisection
+            var outside = 1.0;
+            for (var k = 0u; k < BISECTIONS; k++) {
+                let middle = 0.5 * (inside + outside);
+                if id_at(ids, mix(a, b, middle)) == chart {
+                    inside = middle;
+                } else {
+                    outside = middle;
+                }
+            }
+            let at_border = mix(a, b, inside);
+            // A texel further on, so as to arrive inside the neighbour and not on its rim.
+            let beyond = mix(a, b, min(outside + 1.0 / length((b - a) * size), 1.0));
+            a = select(mix(a, b, outside), beyond, leads_out_of(chart, beyond));
+            seam_id = id_at(ids, a);
+            if !leads_out_of(chart, a) { // charts that touch leave no room for their seams: stay
+                return at_border;
             }
         }
-        let id = id_at(ids, mix(a, b, outside));
-        if id == 0u || (id & INSIDE) != 0u { // no seam is known there: stay at the border
-            return mix(a, b, inside);
-        }
-        let seam = seams[id - 1u];
-        a = settled(ids, across(seam, mix(a, b, outside)));
+        let seam = seams[seam_id - 1u];
+        a = settled(ids, across(seam, a));
         b = across(seam, b);
-        if (id_at(ids, a) & INSIDE) == 0u { // the neighbour is thinner than a texel
-            return a;
-        }
     }
-    return a;
+    return select(a, b, id_at(ids, a) == id_at(ids, b));
 }
 
 @fragment

@@ -53,13 +53,13 @@ def charts(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Charts:
     label = f"mapping {len(mesh.faces)} faces to {size} x {size} texels"
     arrays = cached("charts", key, make, code=code, label=label)
     layout = wgsl.load("charts").layout("array<Seam>")
-    rows = arrays["seams"]
+    rows, owners = arrays["seams"], arrays["owners"]
     return Charts(
         size=size,
         gradient_u=gpu.texture(arrays["gradient_u"], "rgba16float"),
         gradient_v=gpu.texture(arrays["gradient_v"], "rgba16float"),
         ids=gpu.texture(arrays["ids"], "r32uint"),
-        seams=gpu.buffer(layout.pack({"to_u": rows[:, 0], "to_v": rows[:, 1]})),
+        seams=gpu.buffer(layout.pack({"to_u": rows[:, 0], "to_v": rows[:, 1], "chart": owners})),
     )
 
 
@@ -94,8 +94,10 @@ def _make(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Arrays:
     texels = graph.read(ids)[..., 0].copy()
     gradient_u = graph.read(drawn.gradient_u).copy()
     gradient_u[..., 3] = _clearance(texels)
+    maps, owners = _leading_inside(texels, seams.maps, seams.charts)
     return {
-        "seams": _leading_inside(texels, seams.maps).astype(np.float32),  # in this order: it changes the ids
+        "seams": maps.astype(np.float32),
+        "owners": owners.astype(np.uint32),
         "ids": texels,
         "gradient_u": gradient_u,
         "gradient_v": graph.read(drawn.gradient_v),
@@ -115,8 +117,9 @@ def _clearance(ids: Array) -> Array:
     return np.asarray(distance_transform_edt(free))[1:-1, 1:-1]
 
 
-def _leading_inside(ids: Array, maps: Array) -> Array:
-    """The seams (N, 2, 3), with more of them so that each gutter texel leads into a chart; changes `ids` in place.
+def _leading_inside(ids: Array, maps: Array, owners: Array) -> tuple[Array, Array]:
+    """The seams (N, 2, 3) and the charts (N,) that they lead out of, with more of them so that each gutter texel leads
+    into a chart; changes `ids` in place.
 
     Where more than two charts meet, and at charts thinner than a texel, the place across the seam may be off the
     charts itself. If it is in another gutter, that one's seam is followed too; else the nearest texel inside a chart
@@ -142,7 +145,7 @@ def _leading_inside(ids: Array, maps: Array) -> Array:
         extra[off] = 0
         extra[off, :, 2] = (nearest[::-1, row[off], column[off]].T + 0.5) / size
     ids[row, column] = len(maps) + 1 + np.arange(len(lost), dtype=np.uint32)
-    return np.concatenate([maps, extra])
+    return np.concatenate([maps, extra]), np.concatenate([owners, owners[seam[lost]]])
 
 
 def _is_gutter(ids: Array) -> Array:

@@ -23,6 +23,8 @@ class Seams:
     """float64 (N,): +1 where the outside of the chart is to the left of the edge (in uv, v down), else -1"""
     maps: Array
     """float64 (N, 2, 3): the affine map from uv beyond the edge to the uv of the neighbouring triangle"""
+    charts: Array
+    """int32 (N,): the chart that each is a border of"""
 
 
 def find_seams(surface: Surface, roots: Array) -> Seams:
@@ -56,7 +58,12 @@ def find_seams(surface: Surface, roots: Array) -> Seams:
     step_beyond, _ = _perpendicular(edge_beyond, atlas[third[beyond]] - atlas[k], (roots[k] + roots[m]) / 2)
     A = np.stack([edge_beyond, step_beyond], axis=-1) @ np.linalg.inv(frame)
     t = atlas[k] - np.einsum("nij,nj->ni", A, atlas[i])
-    return Seams(np.stack([atlas[i], atlas[j]], axis=1), -side, np.concatenate([A, t[..., None]], axis=-1))
+    return Seams(
+        np.stack([atlas[i], atlas[j]], axis=1),
+        -side,
+        np.concatenate([A, t[..., None]], axis=-1),
+        surface.charts[border // 3],
+    )
 
 
 def apply(maps: Array, uv: Array) -> Array:
