@@ -6,6 +6,7 @@ const DIRECTIONAL: u32 = 0u;
 const POINT: u32 = 1u;
 const PATCH: u32 = 2u; // a small piece of a surface that emits by the cosine
 
+// Loops over lights end at arrayLength: were it a uniform, lavapipe would compile, and keep, a shader for each draw.
 struct Light {
     position: vec3f,  // mm; of a directional light the unit direction towards it
     kind: u32,

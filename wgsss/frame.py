@@ -33,7 +33,7 @@ class View:
 class Frame:
     """What methods draw from: the stage, the view, the g-buffer and the lights.
 
-    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, their `count`, views and shadow_maps.
+    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps.
     """
 
     graph: Graph
@@ -140,19 +140,18 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
     else:
         key = TextureKey((1, 1, 1), "depth32float", wgpu.TextureUsage.TEXTURE_BINDING)
         maps = stage.shared(key, lambda: stage.gpu.acquire(key))
-    return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps, count=len(found.lights))
+    return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps)
 
 
 def irradiance_pixels(frame: Frame) -> Handle:
     """L_d, W/m^2, at each pixel."""
     irradiance: Any = None
     for body in frame.stage.bodies:
-        params = {"clip_to_world": frame.view.clip_to_world, "lights": frame.lighting.count}
         irradiance = frame.graph.draw(
             "frame/irradiance_pixels",
             into=irradiance,
             size=frame.size,
-            params=params,
+            params={"clip_to_world": frame.view.clip_to_world},
             environment=body.environment.irradiance,
             **frame.seen("where_seen", "normal", "depth"),
             **frame.light_bindings(body),
@@ -166,7 +165,6 @@ def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
         "frame/irradiance_texels",
         size=(map_size, map_size),
         indices=body.indices,
-        params={"lights": frame.lighting.count},
         vertices=body.vertices,
         environment=body.environment.irradiance,
         **vars(body.maps),
@@ -176,11 +174,9 @@ def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
 
 def irradiance_vertices(frame: Frame, body: Body) -> Handle:
     """L_d, W/m^2, at a body's render vertices: a buffer of vec4f."""
-    count = len(body.layout.vertex)
     return frame.graph.dispatch(
         "frame/irradiance_vertices",
-        size=count,
-        params={"lights": frame.lighting.count, "vertices": count},
+        size=len(body.layout.vertex),
         vertices=body.vertices,
         environment=body.environment.irradiance,
         **frame.light_bindings(body),
@@ -196,7 +192,6 @@ def specular(frame: Frame) -> Handle:
             "eye": frame.view.eye,
             "alpha": body.material.roughness**2,
             "eta": body.material.eta,
-            "lights": frame.lighting.count,
         }
         reflected = frame.graph.draw(
             "frame/specular",

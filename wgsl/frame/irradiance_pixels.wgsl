@@ -8,7 +8,6 @@ import package::targets::{RGBA32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
-    lights: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -43,7 +42,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
     var total = transmitted_environment(environment, linear_wrap_u, n);
-    for (var i = 0u; i < params.lights; i++) {
+    for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
         if dot(n, at.direction) <= 0.0 {

@@ -5,24 +5,19 @@ import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::targets::{RGBA16Float};
 
-struct Params {
-    lights: u32,
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> lights: array<Light>;
-@group(0) @binding(4) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(5) var shadow_maps: texture_depth_2d_array;
-@group(0) @binding(6) var compare_less: sampler_comparison;
-@group(0) @binding(7) var rho_dt_table: texture_2d<f32>;
-@group(0) @binding(8) var environment: texture_2d<f32>;
-@group(0) @binding(9) var linear_wrap_u: sampler;
-@group(0) @binding(10) var base_color_map: texture_2d<f32>;
-@group(0) @binding(11) var normal_map: texture_2d<f32>;
-@group(0) @binding(12) var specular_map: texture_2d<f32>;
-@group(0) @binding(13) var linear_repeat: sampler;
+@group(0) @binding(0) var<uniform> surface: Surface;
+@group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(2) var<storage, read> lights: array<Light>;
+@group(0) @binding(3) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(4) var shadow_maps: texture_depth_2d_array;
+@group(0) @binding(5) var compare_less: sampler_comparison;
+@group(0) @binding(6) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(7) var environment: texture_2d<f32>;
+@group(0) @binding(8) var linear_wrap_u: sampler;
+@group(0) @binding(9) var base_color_map: texture_2d<f32>;
+@group(0) @binding(10) var normal_map: texture_2d<f32>;
+@group(0) @binding(11) var specular_map: texture_2d<f32>;
+@group(0) @binding(12) var linear_repeat: sampler;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -53,7 +48,7 @@ fn fs(in: Varying) -> Texel {
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
     var irradiance = transmitted_environment(environment, linear_wrap_u, n);
-    for (var i = 0u; i < params.lights; i++) {
+    for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
         if dot(n, at.direction) <= 0.0 {

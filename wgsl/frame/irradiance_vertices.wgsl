@@ -4,33 +4,27 @@ import package::mesh::{Vertex, Surface};
 import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
 
-struct Params {
-    lights: u32,
-    vertices: u32,
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> lights: array<Light>;
-@group(0) @binding(4) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(5) var shadow_maps: texture_depth_2d_array;
-@group(0) @binding(6) var compare_less: sampler_comparison;
-@group(0) @binding(7) var rho_dt_table: texture_2d<f32>;
-@group(0) @binding(8) var environment: texture_2d<f32>;
-@group(0) @binding(9) var linear_wrap_u: sampler;
-@group(0) @binding(10) var<storage, read_write> irradiance: array<vec4f>;
+@group(0) @binding(0) var<uniform> surface: Surface;
+@group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(2) var<storage, read> lights: array<Light>;
+@group(0) @binding(3) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(4) var shadow_maps: texture_depth_2d_array;
+@group(0) @binding(5) var compare_less: sampler_comparison;
+@group(0) @binding(6) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(7) var environment: texture_2d<f32>;
+@group(0) @binding(8) var linear_wrap_u: sampler;
+@group(0) @binding(9) var<storage, read_write> irradiance: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= params.vertices {
+    if id.x >= arrayLength(&vertices) {
         return;
     }
     let vertex = vertices[id.x];
     let x = (surface.object_to_world * vec4f(vertex.position, 1.0)).xyz;
     let n = normalize((surface.object_to_world * vec4f(vertex.normal, 0.0)).xyz);
     var total = transmitted_environment(environment, linear_wrap_u, n);
-    for (var i = 0u; i < params.lights; i++) {
+    for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
         if dot(n, at.direction) <= 0.0 {

@@ -14,7 +14,6 @@ struct Params {
     eye: vec4f,
     alpha: Number,
     eta: Number,
-    lights: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -52,7 +51,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance.
     let mirrored = textureSampleLevel(reflection, linear_wrap_u, lat_long_of_direction(reflect(-w_o, n)), 0.0).rgb;
     var total = mirrored * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
-    for (var i = 0u; i < params.lights; i++) {
+    for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
         let f_r = ggx_brdf(n, at.direction, w_o, params.alpha, params.eta);

@@ -1,0 +1,30 @@
+"""From a scene and a method to an image, again and again."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from wgsss.methods import METHODS, make_method
+from wgsss.rendering import Renderer
+from wgsss.scene import load_scene
+
+
+def resident() -> int:
+    """Bytes of memory that this process holds, the driver's included."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory it holds")
+@pytest.mark.parametrize("method", METHODS)
+def test_memory_does_not_grow_from_frame_to_frame(gpu, method):
+    knobs = {"map_size": 64} if method == "deon07" else {}
+    renderer = Renderer(load_scene("wave", vertices=1000), make_method(method, knobs), (32, 32), gpu)
+    for number in range(10):
+        renderer.frame(number / 25, timed=False)
+    before = resident()
+    for number in range(40):
+        renderer.frame(number / 25, timed=False)
+    assert resident() - before < 8 << 20
