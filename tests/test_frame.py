@@ -146,6 +146,37 @@ def test_sphere_matches_its_solid_angle(gpu):
     assert got == pytest.approx(np.pi * 5 * (10 / 40) ** 2, rel=0.02)
 
 
+def test_sphere_amid_the_scene_lights_all_around(gpu):
+    """Below a ceiling, a lamp lights the floor as from its solid angle, and the ceiling, which is as far, as much."""
+    ceiling = Object(plane(y=20.0).deformed(plane(y=20.0).positions * [1, 1, -1]), MATTE)
+    light = SphereLight((0, 10, 0), 2.0, (5, 5, 5), samples=40)
+    looks = ((0, 5, 0), (0, 0, 0)), ((0, 15, 0), (0, 20, 0))
+    for eye, target in looks:
+        camera = PerspectiveCamera(eye, target, up=(0, 0, 1), fov=20)
+        got = irradiance(gpu, lit(light, extra=(ceiling,), camera=camera))[SIZE // 2, SIZE // 2, 0]
+        assert got == pytest.approx(np.pi * 5 * (2 / 10) ** 2, rel=0.03)
+
+
+def test_sphere_around_the_middle_of_the_scene(gpu):
+    left, right = (Object(sphere(5.0, 500), MATTE, translate=(x, 0, 0)) for x in (-20, 20))
+    scene = replace(lit(SphereLight((0, 0, 0), 2.0, (5, 5, 5))), objects=(left, right))
+    got = irradiance(gpu, replace(scene, camera=replace(ABOVE, height=60.0)))[..., 0]
+    assert got[:, : SIZE // 2].max() > 0.1
+    np.testing.assert_allclose(got[:, : SIZE // 2].sum(), got[:, SIZE // 2 :].sum(), rtol=0.1)
+
+
+@pytest.mark.parametrize("distance", [2e3, 1e5, 1e9])
+def test_a_distant_light_casts_the_shadows_of_a_parallel_one(gpu, distance):
+    away = np.array([0.6, 0.8, 0.0]) * distance
+    lamp = PointLight(tuple(away), (2 * (distance * 1e-3) ** 2,) * 3)
+    parallel = DirectionalLight((-0.6, -0.8, 0), (2, 2, 2))
+    shade = Object(plane(side=4.0, y=5.0), MATTE)
+    got, expected = (irradiance(gpu, lit(light, extra=(shade,)), 128)[..., 0] for light in (lamp, parallel))
+    assert (expected < 0.01).any()
+    differs = np.abs(got - expected) > 0.05
+    assert differs.mean() < 40 / distance
+
+
 def write_environment(path, pixels):
     import OpenEXR
 
@@ -308,6 +339,11 @@ def test_exposure_tone_curve_and_srgb(gpu, curve, expected):
     c = expected(0.5 * got.pixels[0, 0, :3].astype(float))
     encoded = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
     np.testing.assert_allclose(got.display[0, 0, :3], 255 * encoded, atol=0.6)
+
+
+def test_too_bright_is_white(gpu):
+    blinding = DirectionalLight((0, -1, 0), (1e25, 1e25, 1e25))
+    assert (image(gpu, replace(lit(blinding), tone_map="aces")).display == 255).all()
 
 
 def test_an_open_sheet_shows_its_back_lit_from_behind(gpu):

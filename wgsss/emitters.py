@@ -18,6 +18,7 @@ Array = npt.NDArray[Any]
 
 DIRECTIONAL, POINT, PATCH = 0, 1, 2  # wgsl/light.wgsl
 WIDEST_VIEW = 120.0  # degrees: a light that sees the scene within less gets one view of it, another a cube of six
+PARALLEL = 1 / 2048  # scene radius over distance: from farther away, shadows are within a texel those of parallel light
 MAX_VIEWS = 256  # layers of an array texture that every adapter has
 _CUBE = (
     ((1, 0, 0), (0, 1, 0)),
@@ -48,7 +49,7 @@ def emitters(lights: Sequence[Light], points: Array) -> Emitters:
     found: list[dict[str, Any]] = []
     views: list[dict[str, Any]] = []
     for light in lights:
-        for emitter in _emitters(light, points.mean(axis=0)):
+        for emitter in _emitters(light, points):
             seen = _views(emitter, points)
             found.append({**emitter, "first_view": len(views), "views": len(seen)})
             views += seen
@@ -61,7 +62,7 @@ def emitters(lights: Sequence[Light], points: Array) -> Emitters:
     return Emitters(found, views, size)
 
 
-def _emitters(light: Light, centre: Array) -> list[dict[str, Any]]:
+def _emitters(light: Light, points: Array) -> list[dict[str, Any]]:
     """Position, kind, power and normal of a light's emitters."""
     nowhere = (0.0, 0.0, 0.0)
     if isinstance(light, DirectionalLight):
@@ -72,10 +73,17 @@ def _emitters(light: Light, centre: Array) -> list[dict[str, Any]]:
         return [{"position": light.position, "kind": POINT, "power": light.intensity, "normal": nowhere}]
     if isinstance(light, EnvironmentLight):
         return []
-    positions, normals, area = _rect(light) if isinstance(light, RectLight) else _sphere(light, centre)
+    if isinstance(light, RectLight):
+        positions, normals, area, kind = *_rect(light), PATCH
+    elif _angle(light.position, points) < WIDEST_VIEW:
+        positions, normals, area, kind = *_half_sphere(light, points.mean(axis=0)), PATCH
+    else:  # amid the scene: seen from any side as a disc, points that emit to all sides give the same
+        normals = _spiral(light.samples, -1.0)
+        positions = np.asarray(light.position) + light.radius * normals
+        area, kind = math.pi * light.radius**2, POINT
     intensity = np.asarray(light.radiance) * (area * 1e-6 / len(positions))  # W/sr along the normal; area in mm^2
     return [
-        {"position": x, "kind": PATCH, "power": intensity, "normal": n} for x, n in zip(positions, normals, strict=True)
+        {"position": x, "kind": kind, "power": intensity, "normal": n} for x, n in zip(positions, normals, strict=True)
     ]
 
 
@@ -94,45 +102,69 @@ def _rect(light: RectLight) -> tuple[Array, Array, float]:
     return np.asarray(light.position) + cells, np.broadcast_to(normal, cells.shape), light.width * light.height
 
 
-def _sphere(light: SphereLight, centre: Array) -> tuple[Array, Array, float]:
-    """Points of the half that faces the scene, on a Fibonacci spiral of equal areas. The area is scaled so that their
-    cosines sum to the disc of the same radius, as the whole half would."""
+def _half_sphere(light: SphereLight, centre: Array) -> tuple[Array, Array, float]:
+    """Points of the half that faces the scene, their normals, and the area in mm^2, scaled so that their cosines sum to
+    the disc of the same radius, as the whole half would."""
     towards = _unit(centre - np.asarray(light.position))
-    i = np.arange(light.samples) + 0.5
-    z = 1 - i / light.samples
-    phi = math.pi * (3 - math.sqrt(5)) * i
     right = _unit(np.cross(towards, (0, 0, 1) if abs(towards[2]) < 0.9 else (1, 0, 0)))
-    ring = np.sqrt(1 - z * z)[:, None]
-    normals = (
-        ring * (np.cos(phi)[:, None] * right + np.sin(phi)[:, None] * np.cross(towards, right)) + z[:, None] * towards
-    )
-    area = math.pi * light.radius**2 * light.samples / z.sum()
+    spiral = _spiral(light.samples, 0.0)
+    normals = spiral @ np.stack([right, np.cross(towards, right), towards])
+    area = math.pi * light.radius**2 * light.samples / spiral[:, 2].sum()
     return np.asarray(light.position) + light.radius * normals, normals, area
+
+
+def _spiral(count: int, low: float) -> Array:
+    """Points (count, 3) of the unit sphere from z = 1 down to `low`, on a Fibonacci spiral of equal areas."""
+    i = np.arange(count) + 0.5
+    z = 1 - (1 - low) * i / count
+    phi = math.pi * (3 - math.sqrt(5)) * i
+    ring = np.sqrt(1 - z * z)
+    return np.stack([ring * np.cos(phi), ring * np.sin(phi), z], axis=1)
+
+
+def _ball(points: Array) -> tuple[Array, float]:
+    """Centre and radius of a ball that holds the points."""
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return centre, max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-3)
+
+
+def _angle(position: Any, points: Array) -> float:
+    """The angle within which the points are seen from a position, degrees; 180 amid them."""
+    centre, radius = _ball(points)
+    distance = float(np.linalg.norm(centre - position))
+    return 180.0 if distance <= radius else 2 * math.degrees(math.asin(radius / distance))
 
 
 def _views(emitter: dict[str, Any], points: Array) -> list[dict[str, Any]]:
     """Shadow views: `extent` is the width seen, mm, of a perspective view per mm of distance."""
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    radius = max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-3)
+    centre, radius = _ball(points)
     position = np.asarray(emitter["position"], np.float64)
     if emitter["kind"] == DIRECTIONAL:
-        camera: Any = OrthographicCamera(tuple(centre + 2 * radius * position), tuple(centre), _up(position))
-        seen = points @ camera.view()[:3, :3].T
-        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-        extent = 1.02 * float((seen.max(axis=0) - seen.min(axis=0))[:2].max())
-        shift = camera.view()[:3, :3].T @ (middle - camera.view()[:3, :3] @ centre)
-        camera = OrthographicCamera(tuple(camera.eye + shift), tuple(centre + shift), _up(position), height=extent)
-        return [_view(camera, 0.5 * radius, 3.5 * radius, extent, perspective=0)]
+        return [_parallel_view(position, points)]
     distance = float(np.linalg.norm(centre - position))
-    angle = 2 * math.degrees(math.asin(min(radius / max(distance, 1e-9), 1.0)))
+    if radius < PARALLEL * distance:
+        return [_parallel_view((position - centre) / distance, points)]
+    angle = _angle(position, points)
     if angle < WIDEST_VIEW:
-        fov = max(1.02 * angle, 1.0)
+        fov = 1.02 * angle
         camera = PerspectiveCamera(tuple(position), tuple(centre), _up(centre - position), fov=fov)
         near = max(distance - 1.01 * radius, 1e-3 * distance)
         return [_view(camera, near, distance + 1.01 * radius, 2 * math.tan(math.radians(fov) / 2), perspective=1)]
     far = distance + 1.01 * radius
     cameras = [PerspectiveCamera(tuple(position), tuple(position + d), up, fov=90.0) for d, up in _CUBE]
     return [_view(camera, 1e-3 * radius, far, 2.0, perspective=1) for camera in cameras]
+
+
+def _parallel_view(towards: Array, points: Array) -> dict[str, Any]:
+    """The view from a light so far away, in direction `towards`, that its rays are parallel."""
+    centre, radius = _ball(points)
+    camera = OrthographicCamera(tuple(centre + 2 * radius * towards), tuple(centre), _up(towards))
+    turn = camera.view()[:3, :3]
+    seen = points @ turn.T
+    extent = 1.02 * float(np.ptp(seen, axis=0)[:2].max())
+    shift = turn.T @ (0.5 * (seen.min(axis=0) + seen.max(axis=0)) - turn @ centre)
+    camera = OrthographicCamera(tuple(camera.eye + shift), tuple(centre + shift), _up(towards), height=extent)
+    return _view(camera, 0.5 * radius, 3.5 * radius, extent, perspective=0)
 
 
 def _view(camera: Any, near: float, far: float, extent: float, perspective: int) -> dict[str, Any]:

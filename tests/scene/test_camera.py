@@ -78,7 +78,11 @@ def test_turning_goes_about_up_through_the_target(kind: type) -> None:
         (PerspectiveCamera, {"eye": (0, 9, 0), "target": (0, 0, 0)}, "up must not be parallel"),
         (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "up": (0, 0, 0)}, "up must not be the zero vector"),
         (PerspectiveCamera, {"eye": (0, 0, math.nan), "target": (0, 0, 0)}, "eye must be three numbers, each finite"),
-        (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "fov": 0.5}, "fov must be from 1 to 170, not 0.5"),
+        (
+            PerspectiveCamera,
+            {"eye": (0, 0, 1), "target": (0, 0, 0), "fov": 0.01},
+            "fov must be from 0.05 to 170, not 0.01",
+        ),
         (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "turn": math.inf}, "turn must be a finite number"),
         (OrthographicCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "height": 0}, "height must be above 0, not 0"),
     ],

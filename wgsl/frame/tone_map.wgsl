@@ -32,7 +32,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let sample = textureLoad(radiance, vec2u(pixel.xy), 0);
-    var c = max(sample.rgb * params.scale, vec3f(0.0));
+    var c = clamp(sample.rgb * params.scale, vec3f(0.0), vec3f(1e9)); // beyond, the curves' squares overflow
     if params.curve == REINHARD {
         c = c / (1.0 + c);
     } else if params.curve == ACES {

@@ -74,7 +74,7 @@ class PerspectiveCamera(_Camera):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.number(self, "fov", 1, 170)
+        checks.number(self, "fov", 0.05, 170)
         checks.number(self, "turn")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:
