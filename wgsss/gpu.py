@@ -193,6 +193,13 @@ class Gpu:
         """Wait until all submitted work is done."""
         self.queue.read_buffer(self._fence)
 
+    @property
+    def ns_per_tick(self) -> float:
+        """Nanoseconds per tick of the device's timestamps."""
+        from wgpu.backends.wgpu_native import lib
+
+        return float(lib.wgpuQueueGetTimestampPeriod(self.queue._internal))
+
     # what passes need again and again
 
     def sampler(self, name: str) -> Any:

@@ -198,8 +198,9 @@ class Encoder:
         )
         self.encoder.resolve_query_set(self.queries, 0, count, resolved, 0)
         self._submit()
-        ticks = np.frombuffer(self.gpu.queue.read_buffer(resolved), np.uint64).reshape(-1, 2)  # nanoseconds
-        self.times = {p.name: float(end - begin) * 1e-6 for p, (begin, end) in zip(self.passes, ticks, strict=True)}
+        ticks = np.frombuffer(self.gpu.queue.read_buffer(resolved), np.uint64).reshape(-1, 2)
+        ms = (ticks[:, 1] - ticks[:, 0]).astype(np.float64) * (self.gpu.ns_per_tick * 1e-6)
+        self.times = {p.name: float(t) for p, t in zip(self.passes, ms, strict=True)}
 
 
 def _encode_dispatch(gpu: Gpu, encoder: Any, item: Pass, pipeline: Any, group: Any, stamps: dict[str, Any]) -> None:
