@@ -33,3 +33,12 @@ def lit(
 ) -> Scene:
     """A scene of one object and what else is in it."""
     return Scene("test", (Object(mesh or plane(), material), *extra), lights, camera, tone_map="none")
+
+
+def write_environment(path: Any, pixels: np.ndarray) -> str:
+    """An EXR image of latitude and longitude; returns its path."""
+    import OpenEXR
+
+    channels = {"RGB": np.ascontiguousarray(pixels, np.float32)}
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
+    return str(path)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import ABOVE, MATTE, WHITE, lit, plane
+from scenes import ABOVE, MATTE, WHITE, lit, plane, write_environment
 
 from wgsss import frame as shared
 from wgsss.bake.environment import rho_dt_table
@@ -175,14 +175,6 @@ def test_a_distant_light_casts_the_shadows_of_a_parallel_one(gpu, distance):
     assert (expected < 0.01).any()
     differs = np.abs(got - expected) > 0.05
     assert differs.mean() < 40 / distance
-
-
-def write_environment(path, pixels):
-    import OpenEXR
-
-    channels = {"RGB": np.ascontiguousarray(pixels, np.float32)}
-    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
-    return str(path)
 
 
 def test_environment_of_half_a_sky(gpu, tmp_path):
