@@ -30,14 +30,16 @@ struct Texel {
     @location(0) blurred: RGBA16Float,
 }
 
-const REACH: f32 = 3.0;       // sigmas to each side: 99.7 % of the Gaussian, and the weights are normalised
-const SPACING: f32 = 1.5;     // sigmas of the source's own blur from tap to tap: ripples stay below 1e-3
-const SPLINE: f32 = 1.0 / 3.0; // variance in texels^2 of the spline that the result is read through (gather.wgsl)
-const BOX: f32 = 1.0 / 12.0;   // of a texel of the irradiance, which holds the mean over its area
-const HALVING: f32 = 0.25;     // of reading a larger map between its texels
-const MAX_TAPS: f32 = 64.0;   // to each side
+const REACH: f32 = 3.0;   // sigmas to each side: 99.7 % of the Gaussian, and the weights are normalised
+const SPACING: f32 = 1.5; // sigmas of the source's own blur from tap to tap: ripples stay below 1e-3
+const MAX_TAPS: f32 = 64.0; // to each side
 const MAX_CROSSINGS: u32 = 6u;
-const BISECTIONS: u32 = 8u;   // to a texel, of a step of up to 256
+const BISECTIONS: u32 = 8u; // to a texel, of a step of up to 256
+
+// What maps blur by themselves, as variances in texels^2.
+const SPLINE: f32 = 1.0 / 3.0; // the spline that the result is read through (gather.wgsl)
+const BOX: f32 = 1.0 / 12.0;   // a texel of the irradiance is a mean over its area; later, taps between texels add as much
+const HALVING: f32 = 0.25;     // reading a larger map between its texels
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
