@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -246,6 +247,8 @@ BAD = [
     ("render ear --size -5x5", "--size"),
     ("render ear --frames 0", "--frames"),
     ("render ear --fps nan", "--fps"),
+    ("render ear --fps 1e300", "'1e300' is not a number from 0.01 to 1000"),
+    ("render ear --vertices 9999999999", "'9999999999' is not a whole number from 1 to 999999999"),
     ("render ear --time soon", "'soon' is not a number"),
     ("render ear --exposure 99", "exposure"),
     ("render ear --tone-map asces", "did you mean 'aces'?"),
@@ -318,6 +321,26 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     running.stdout.close()
     assert running.stderr.read() == ""
     assert running.wait() == 141
+
+
+@pytest.mark.parametrize("redirected", [">&-", ">&- 2>&-"])
+def test_without_standard_output_the_work_is_done(tmp_path: Path, redirected: str) -> None:
+    command = shlex.join([sys.executable, "-m", "wgsss", "render", *SMALL])
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(f"{command} {redirected}", shell=True, cwd=tmp_path, env=env, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (tmp_path / "sphere.png").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_standard_output_is_told_in_one_line() -> None:
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "wgsss", "methods"], stdout=full, stderr=subprocess.PIPE, env=env, text=True
+        )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert done.stderr.startswith("wgsss: error: standard output cannot be written (")
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -84,7 +84,11 @@ def test_turning_goes_about_up_through_the_target(kind: type) -> None:
             "fov must be from 0.05 to 170, not 0.01",
         ),
         (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "turn": math.inf}, "turn must be a finite number"),
-        (OrthographicCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "height": 0}, "height must be above 0, not 0"),
+        (
+            OrthographicCamera,
+            {"eye": (0, 0, 1), "target": (0, 0, 0), "height": 0},
+            "height must be at least 1e-06, not 0",
+        ),
     ],
 )
 def test_a_camera_that_cannot_be_is_refused(kind: type, fields: dict, message: str) -> None:

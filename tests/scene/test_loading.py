@@ -205,6 +205,12 @@ def test_a_camera_may_be_given_by_its_orbit(folder: Path) -> None:
         ('"Whole Milk"', "5", "[[object]] 1: material must be a name, a file or a table, not 5"),
         ("translate = [10, 0, 0]", "translate = [10, 0]", "[[object]] 1: translate must be three numbers"),
         ('"sphere"\nradius', '"spere"\nradius', "[[object]] 2: unknown shape 'spere'; did you mean 'sphere'?"),
+        ("translate = [10, 0, 0]", "translate = [1e16, 0, 0]", "translate must not be beyond 1e+15 in size, not 1e+16"),
+        ("irradiance = [1, 2, 3]", "irradiance = [1e39, 2, 3]", "irradiance must not be beyond 3e+38 in size"),
+        ("irradiance = [1, 2, 3]", f"irradiance = [1{400 * '0'}, 2, 3]", "irradiance must be three numbers"),
+        ("eye = [0, 0, 100]", "eye = [0, 1, 1e-300]", "[camera]: eye and target must not be the same point"),
+        ("radius = 5\nvertices", "radius = 'wide'\nvertices", "[[object]] 2: radius must be a number, not 'wide'"),
+        ("radius = 5\nvertices", "radius = 1e-7\nvertices", "[[object]] 2: sphere: a size of 1.99"),
         ("vertices = 500", "vertices = -1", "[[object]] 2: sphere: "),
         ("vertices = 500", 'vertices = "many"', "[[object]] 2: "),
         ('preset = "marble"', 'preset = "marbel"', "[[object]] 2: [object.material]: preset: unknown material"),
@@ -232,6 +238,8 @@ def test_tables_of_the_wrong_form(folder: Path) -> None:
     assert refused(write(folder, f"camera = 3\n{MINIMAL}")) == "[camera]: must be a table, not 3"
     (folder / "scene.toml").write_bytes(b"name = '\xff'")
     assert refused(folder / "scene.toml") == "not a TOML file: it is not UTF-8 text"
+    assert refused(write(folder, f"name = {'[' * 5000}")).startswith("not a TOML file: maximum recursion depth")
+    assert refused(write(folder, f"name = {'9' * 5000}")).startswith("not a TOML file: Exceeds the limit")
     (folder / "scene.toml").write_bytes(b"")
     assert refused(folder / "scene.toml") == "the file is empty"
 

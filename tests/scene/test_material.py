@@ -68,10 +68,11 @@ def test_user_material_has_the_profile_of_its_coefficients() -> None:
     [
         ({"sigma_a": None}, "sigma_a is missing"),
         ({"sigma_s_prime": None}, "sigma_s_prime is missing"),
-        ({"sigma_a": (0.1, -0.1, 0.1)}, "sigma_a must be three numbers, each at least 0"),
+        ({"sigma_a": (0.1, -0.1, 0.1)}, "sigma_a must be three numbers, each from 0 to 1e"),
         ({"sigma_a": (0.1, 0.1)}, "sigma_a must be three numbers"),
         ({"sigma_a": (0.1, "x", 0.1)}, "sigma_a must be three numbers"),
-        ({"sigma_s_prime": (1, 0, 1)}, "sigma_s_prime must be three numbers, each above 0"),
+        ({"sigma_s_prime": (1, 1e-300, 1)}, "sigma_s_prime must be three numbers, each from 1e-06 to 1e"),
+        ({"sigma_s_prime": (1, 0, 1)}, "sigma_s_prime must be three numbers, each from 1e-06 to 1e"),
         ({"sigma_s_prime": (1, float("inf"), 1)}, "sigma_s_prime must be three numbers"),
         ({"gaussians": SKIN_GAUSSIANS}, "give one or the other"),
         ({"eta": 0.9}, "eta must be from 1 to 3, not 0.9"),

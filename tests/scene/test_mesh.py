@@ -527,7 +527,10 @@ def test_positions_that_are_not_finite(tmp_path: Path, value: str, suffix: str) 
         path.write_text(f"v 0 0 0\nv 1 {value} 0\nv 0 1 0\nf 1 2 3\n")
     else:
         path.write_text(f"OFF\n3 1 0\n0 0 0\n1 {value} 0\n0 1 0\n3 0 1 2\n")
-    assert bad(path) in ("1 of 3 positions are not finite numbers", "a size of 1e+39 mm is out of range (1e-6 to 1e9)")
+    assert bad(path) in (
+        "1 of 3 positions are not finite numbers",
+        "a size of 1e+39 mm is out of range (1e-06 to 1e+09)",
+    )
 
 
 def test_nothing_to_render(tmp_path: Path) -> None:
@@ -545,7 +548,7 @@ def test_bad_scales_and_endings(tmp_path: Path) -> None:
     assert bad(path, mm_per_unit=-1) == "mm_per_unit must be a number above 0, not -1"
     assert "mm_per_unit must be" in bad(path, mm_per_unit=float("nan"))
     assert "size_mm must be" in bad(path, size_mm="10")
-    assert bad(path, mm_per_unit=1e-9) == "a size of 1e-09 mm is out of range (1e-6 to 1e9)"
+    assert bad(path, mm_per_unit=1e-9) == "a size of 1e-09 mm is out of range (1e-06 to 1e+09)"
     assert bad(path.rename(tmp_path / "one.fbx")) == (
         "not a mesh format that can be read (.ply .obj .stl .off .glb .gltf)"
     )

@@ -26,7 +26,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             warnings.showwarning = _show_warning
             args = _parse(sys.argv[1:] if argv is None else argv)
             args.run(args)
-        sys.stdout.flush()
         return 0
     except InputError as error:
         return _say("error", error, 2)

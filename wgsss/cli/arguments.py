@@ -73,7 +73,12 @@ def make_method(args: argparse.Namespace) -> Method:
 
 def tell(args: argparse.Namespace, result: Any, text: str) -> None:
     """Print a command's result: as JSON where that was asked for, else as text."""
-    print(json.dumps(result, indent=2, ensure_ascii=False) if args.json else text)
+    try:
+        print(json.dumps(result, indent=2, ensure_ascii=False) if args.json else text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise InputError(f"standard output cannot be written ({error.strerror})") from None
 
 
 def table(rows: list[list[str]]) -> str:
@@ -91,9 +96,9 @@ def size(text: str) -> tuple[int, int]:
 
 
 def count(text: str) -> int:
-    """A whole number above 0."""
+    """A whole number from 1 to 999999999."""
     if not re.fullmatch(r"\d{1,9}", text) or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to 999999999")
     return int(text)
 
 
@@ -113,6 +118,14 @@ def positive(text: str) -> float:
     value = number(text)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
+def rate(text: str) -> float:
+    """Frames per second."""
+    value = number(text)
+    if not 0.01 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 1000")
     return value
 
 

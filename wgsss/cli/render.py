@@ -27,7 +27,7 @@ def declare(commands: Any) -> None:
     add = parser.add_argument
     add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
     add("--frames", metavar="N", type=arguments.count, default=1, help="render N frames (default: 1)")
-    add("--fps", metavar="F", type=arguments.positive, default=25.0, help="frames per second (default: 25)")
+    add("--fps", metavar="F", type=arguments.rate, default=25.0, help="frames per second (default: 25)")
     add("--time", metavar="S", type=arguments.number, default=0.0, help="of the first frame, seconds (default: 0)")
     add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
     add("--tone-map", metavar="NAME", help="none, reinhard or aces, instead of the scene's own")
@@ -69,7 +69,7 @@ def run(args: Any) -> None:
     files = str(written[0]) if len(written) == 1 else f"{written[0]} … {written[-1].name}"
     lines = [f"{files}: {scene.name} by {args.method}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
     if args.graph or dot:
-        graph = renderer.frame(_times(args)[-1], timed=True).graph
+        graph = renderer.frame(_time(args, args.frames - 1), timed=True).graph
         if dot:
             with replacing(dot) as (file,):
                 file.write_text(graph.dot())
@@ -80,8 +80,9 @@ def run(args: Any) -> None:
     arguments.tell(args, result, "\n".join(lines))
 
 
-def _times(args: Any) -> list[float]:
-    return [args.time + i / args.fps for i in range(args.frames)]
+def _time(args: Any, number: int) -> float:
+    """Of a frame, seconds."""
+    return args.time + number / args.fps
 
 
 def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
@@ -89,13 +90,13 @@ def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
     from wgsss.rendering import AOVS
 
     aovs = AOVS if path.suffix.lower() in LINEAR_FORMATS else ()
-    times: Any = _times(args)
-    if len(times) > 1:
+    numbers: Any = range(args.frames)
+    if args.frames > 1:
         from tqdm import tqdm
 
-        times = tqdm(times, desc=path.name, unit="frame", file=sys.stderr, disable=None)  # None: only on a terminal
-    for time_s in times:
-        yield renderer.frame(time_s, aovs, timed=False)
+        numbers = tqdm(numbers, desc=path.name, unit="frame", file=sys.stderr, disable=None)  # None: only on a terminal
+    for number in numbers:
+        yield renderer.frame(_time(args, number), aovs, timed=False)
 
 
 def _described(graph: Graph) -> dict[str, Any]:

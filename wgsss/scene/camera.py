@@ -30,7 +30,7 @@ class _Camera:
         checks.triple(self, "target")
         checks.triple(self, "up", nonzero=True)
         gaze = np.subtract(self.target, self.eye)
-        if not gaze.any():
+        if math.hypot(*gaze) < 1e-9:
             raise InputError("eye and target must not be the same point")
         checks.not_parallel(gaze, self.up, "up must not be parallel to the line from eye to target")
 
@@ -103,7 +103,7 @@ class OrthographicCamera(_Camera):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.number(self, "height", 0, above=True)
+        checks.number(self, "height", 1e-6)
         checks.number(self, "turn")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:

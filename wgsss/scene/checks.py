@@ -14,12 +14,17 @@ from wgsss.errors import InputError
 
 Triple = tuple[float, float, float]
 
+# What single precision holds: squares of coordinates, which may have either sign (the sun is 1.5e14 mm away), and all
+# other numbers (its intensity is 3e25 W/sr).
+LARGEST_SIGNED, LARGEST = 1e15, 3e38
+
 
 def number(owner: object, field: str, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
     """Check that a field is a finite number in low..high; `above` excludes low itself."""
     value = getattr(owner, field)
     if not _is_number(value) or not low <= value <= high or (above and value == low):
         raise InputError(f"{field} must be {_range(low, high, above, 'a finite number')}, not {_show(value)}")
+    _bounded(field, [value], low)
     object.__setattr__(owner, field, float(value))
 
 
@@ -46,7 +51,8 @@ def triple(
     if len(parts) != 3 or not all(_is_number(p) and low <= p <= high and not (above and p == low) for p in parts):
         wanted = _range(low, high, above, "finite")
         raise InputError(f"{field} must be three numbers, each {wanted}, not {_show(value)}")
-    if nonzero and not any(parts):
+    _bounded(field, parts, low)
+    if nonzero and math.hypot(*parts) < 1 / LARGEST_SIGNED:
         raise InputError(f"{field} must not be the zero vector")
     object.__setattr__(owner, field, tuple(float(p) for p in parts))
 
@@ -59,10 +65,17 @@ def not_parallel(first: Iterable[float], second: Iterable[float], message: str) 
         raise InputError(message)
 
 
+def _bounded(field: str, values: list[Any], low: float) -> None:
+    largest = LARGEST_SIGNED if low < 0 else LARGEST
+    for value in values:
+        if abs(value) > largest:
+            raise InputError(f"{field} must not be beyond {largest:g} in size, not {_show(value)}")
+
+
 def _is_number(value: Any) -> bool:
     try:
         return not isinstance(value, bool | str | bytes) and math.isfinite(value)
-    except TypeError:
+    except (TypeError, OverflowError):  # an integer of hundreds of digits
         return False
 
 

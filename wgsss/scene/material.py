@@ -68,8 +68,8 @@ class Material:
             if self.sigma_a is None or self.sigma_s_prime is None:
                 missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
                 raise InputError(f"{missing} is missing: a material needs sigma_a and sigma_s_prime, or gaussians")
-            checks.triple(self, "sigma_a", 0)
-            checks.triple(self, "sigma_s_prime", 0, above=True)
+            checks.triple(self, "sigma_a", 0, 1e6)
+            checks.triple(self, "sigma_s_prime", 1e-6, 1e6)
         elif not isinstance(self.gaussians, SumOfGaussians):
             raise InputError("gaussians must be a SumOfGaussians (variances in mm^2, weights per channel)")
         elif self.sigma_a is not None or self.sigma_s_prime is not None:

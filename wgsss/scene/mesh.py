@@ -18,6 +18,7 @@ from wgsss.scene.material import Maps
 
 Array = npt.NDArray[Any]
 
+MIN_SIZE, MAX_SIZE = 1e-6, 1e9  # of a mesh's longest side, mm
 # A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
 # or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
 OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
@@ -52,12 +53,16 @@ class Mesh:
             raise InputError(f"{self.name}: the mesh has no faces")
         if self.faces.min() < 0 or self.faces.max() >= len(self.positions):
             raise InputError(f"{self.name}: a face names a vertex that is not there")
+        size = float(np.ptp(self.positions, axis=0).max())
+        if not MIN_SIZE <= size <= MAX_SIZE:
+            raise InputError(f"{self.name}: a size of {size:g} mm is out of range ({MIN_SIZE:g} to {MAX_SIZE:g})")
 
     def _hold(self, field: str, dtype: type, shape: tuple[int | None, ...]) -> None:
         value = getattr(self, field)
         if value is None:
             return
-        array: Array = np.ascontiguousarray(value, dtype=dtype).view()
+        with np.errstate(over="ignore"):
+            array: Array = np.ascontiguousarray(value, dtype=dtype).view()
         if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
             wanted = " x ".join("N" if n is None else str(n) for n in shape)
             raise InputError(f"{self.name}: {field} must be {wanted}, not {' x '.join(map(str, array.shape))}")
@@ -149,8 +154,8 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
     if side == 0:
         raise InputError(f"{path}: the mesh has zero size")
     scale = size_mm / side if size_mm is not None else mm_per_unit or MM_PER_UNIT.get(path.suffix.lower(), 1.0)
-    if not 1e-6 < side * scale < 1e9:
-        raise InputError(f"{path}: a size of {side * scale:g} mm is out of range (1e-6 to 1e9)")
+    if not MIN_SIZE <= side * scale <= MAX_SIZE:
+        raise InputError(f"{path}: a size of {side * scale:g} mm is out of range ({MIN_SIZE:g} to {MAX_SIZE:g})")
 
     fixed = repair((file.positions * scale).astype(np.float32), file.faces)
     if not len(fixed.faces):

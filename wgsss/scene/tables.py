@@ -15,6 +15,14 @@ Table = dict[str, Any]
 Parameters = Mapping[str, inspect.Parameter]
 
 
+_KINDS: dict[str, tuple[Any, str]] = {  # what TOML may give for a parameter, by its annotation
+    "str": (str, "text"),
+    "str | None": (str | None, "text"),
+    "float": (float | int, "a number"),
+    "Triple": (list | tuple, "three numbers"),
+}
+
+
 def read_toml(path: Path) -> Table:
     """The top-level table of a file. Raises InputError, naming the file, where it is missing or not TOML."""
     require_file(path)
@@ -22,7 +30,7 @@ def read_toml(path: Path) -> Table:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a TOML file: it is not UTF-8 text") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # of its grammar, too long a number, too deep a nesting
         raise InputError(f"{path}: not a TOML file: {error}") from None
 
 
@@ -33,14 +41,22 @@ def call(function: Callable[..., Any], table: Table, where: str, parameters: Par
     for key, parameter in parameters.items():
         if key not in table and parameter.default is inspect.Parameter.empty:
             raise InputError(f"{where}: key '{key}' is missing")
-        if parameter.annotation in ("str", "str | None") and not isinstance(table.get(key, ""), str | None):
-            raise InputError(f"{where}: {key} must be text, not {table[key]!r}")
+        if parameter.annotation in ("str", "str | None"):
+            _check_kind(parameter, table, where)
     try:
         return function(**table)
     except InputError as error:
         raise at(where, error) from None
     except (TypeError, ValueError) as error:
+        for parameter in parameters.values():
+            _check_kind(parameter, table, where)
         raise InputError(f"{where}: a value of the wrong type: {error}") from None
+
+
+def _check_kind(parameter: inspect.Parameter, table: Table, where: str) -> None:
+    kinds, what = _KINDS.get(str(parameter.annotation), (object, ""))
+    if parameter.name in table and not isinstance(table[parameter.name], kinds):
+        raise InputError(f"{where}: {parameter.name} must be {what}, not {table[parameter.name]!r}")
 
 
 def call_kind(table: Any, kinds: Mapping[str, Any], where: str) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from wgsss.errors import InputError
@@ -20,10 +18,10 @@ def slab(size: tuple[float, float, float] = (40.0, 40.0, 4.0), vertices: int | N
     """A box of `size` (x, y, z) mm about the origin with flat corner normals and one chart per side.
 
     Positions are welded over the edges; all six charts have the same scale, upright as seen from outside, and lie apart
-    by gutters. Vertices: 100 to 1000000, by default 6000. Raises InputError for another count or a size not above zero.
+    by gutters. Vertices: 100 to 1000000, by default 6000. Raises InputError for another count or a size out of range.
     """
-    if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
-        raise InputError(f"slab: size must be three lengths above 0 mm, got {tuple(size)}")
+    if len(size) != 3 or not all(0 < s <= 1e9 for s in size):
+        raise InputError(f"slab: size must be three lengths above 0 mm, at most 1e9, got {tuple(size)}")
     wanted = vertex_count("slab", vertices, 6000, 100, 1_000_000)
 
     def cells_at(spacing: float) -> np.ndarray:

@@ -14,10 +14,10 @@ from wgsss.scene.shapes._rows import vertex_count
 def sphere(radius: float = 20.0, vertices: int | None = None) -> Mesh:
     """A sphere of `radius` mm about the origin: an icosahedron whose edges are cut into f parts, 10 f^2 + 2 vertices.
 
-    Vertices: 90 to 1000000, by default 4000. Raises InputError for another count or a radius not above zero.
+    Vertices: 90 to 1000000, by default 4000. Raises InputError for another count or a radius out of range.
     """
-    if not (math.isfinite(radius) and radius > 0):
-        raise InputError(f"sphere: radius must be above 0 mm, got {radius}")
+    if not 0 < radius <= 1e9:
+        raise InputError(f"sphere: radius must be above 0 mm, at most 1e9, got {radius}")
     wanted = vertex_count("sphere", vertices, 4000, 90, 1_000_000)
     frequency = round(math.sqrt((wanted - 2) / 10))
     corners, triangles = _icosahedron()
