@@ -49,8 +49,8 @@ def sphere(vertices: int | None = None) -> Scene:
 def ear(vertices: int | None = None) -> Scene:
     """a thin ear with a thick rim, lit from the front and strongly from behind"""
     auricle = Object(shapes.ear(vertices), material("skin"))
-    key = RectLight((-150, 120, 260), (0.46, -0.37, -0.8), (0, 1, 0), 120, 120, radiance=(17, 16, 15.5), samples=9)
-    back = SphereLight((70, 60, -190), 22, radiance=(330, 310, 290), samples=9)
+    key = RectLight((-150, 120, 260), (0.46, -0.37, -0.8), (0, 1, 0), 120, 120, radiance=(17, 16, 15.5), samples=6)
+    back = SphereLight((70, 60, -190), 22, radiance=(330, 310, 290), samples=6)
     fill = EnvironmentLight((0.08, 0.09, 0.11))
     return Scene("ear", (auricle,), (key, back, fill), _framing([auricle], azimuth=-8, elevation=4))
 
