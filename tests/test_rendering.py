@@ -6,10 +6,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenes import lit
 
 from wgsss.methods import METHODS, make_method
 from wgsss.rendering import Renderer
-from wgsss.scene import load_scene
+from wgsss.scene import EnvironmentLight, load_scene
+
+
+def test_scenes_without_shadows_leave_no_textures_behind(gpu):
+    scene = lit(EnvironmentLight((1, 1, 1)))
+    Renderer(scene, make_method("lambert"), (8, 8), gpu).frame()
+    before = len(gpu._views)
+    Renderer(scene, make_method("lambert"), (8, 8), gpu).frame()
+    assert len(gpu._views) == before
 
 
 def resident() -> int:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from wgsss.bake.environment import rho_dt_table
 from wgsss.emitters import emitters
-from wgsss.gpu import TextureKey
 from wgsss.graph import Graph, Handle
 from wgsss.scene import OrthographicCamera, Scene
 from wgsss.scene.scene import TONE_MAPS
@@ -118,8 +117,6 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
 
 def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
     """Lights and the shadow maps of those that cast shadows."""
-    import wgpu
-
     found = emitters(stage.scene.lights, _world_points(stage.scene))
     side = found.shadow_size
     if found.views:
@@ -138,8 +135,7 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
                     label=str(layer),
                 )
     else:
-        key = TextureKey((1, 1, 1), "depth32float", wgpu.TextureUsage.TEXTURE_BINDING)
-        maps = stage.shared(key, lambda: stage.gpu.acquire(key))
+        maps = stage.gpu.no_depth
     return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps)
 
 

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections import defaultdict
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -173,6 +173,15 @@ class Gpu:
         )
         raw = data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
         return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
+
+    @cached_property
+    def no_depth(self) -> Any:
+        """A depth texture of one texel, to bind where there is none."""
+        import wgpu
+
+        return self.device.create_texture(
+            size=(1, 1, 1), format="depth32float", usage=wgpu.TextureUsage.TEXTURE_BINDING
+        )
 
     def read_texture(self, texture: Any) -> np.ndarray:
         """The texels of a texture: (height, width, channels), with a leading axis of layers where there are several."""
