@@ -1,6 +1,5 @@
 """The built-in scenes: one function each, made by code, standing for what the source papers rendered.
 
-Each takes the approximate vertex count of its mesh and raises InputError where that is out of the shape's range.
 Each takes the approximate vertex count of its mesh and raises InputError where a shape cannot have it.
 """
 
@@ -8,42 +7,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from wgsss.errors import InputError
 from wgsss.scene import shapes
 from wgsss.scene.camera import PerspectiveCamera
+from wgsss.scene.defaults import framing
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
 from wgsss.scene.material import Material, material
 from wgsss.scene.motion import BendAndSwell
 from wgsss.scene.scene import Object, Scene
 
-# A green leaf of 0.35 mm: by diffusion in a slab it transmits 5, 16 and 3 % and reflects 10, 18 and 7 % of red, green
-# and blue light, about what is measured of living leaves (Jacquemoud & Baret 1990, "PROSPECT", at 670, 550 and 450 nm).
+# Green leaf: as a half-space it reflects 10, 18 and 8 % of red, green and blue light by the dipole; 0.35 mm of it, by
+# diffusion in a slab, transmit 3, 9 and 1 %.
 LEAF = Material("leaf", sigma_a=(3.2, 1.4, 4.4), sigma_s_prime=(5.0, 5.2, 4.6), eta=1.42, roughness=0.45, specular=0.8)
 # Honey-coloured wax. Scattering as of paraffin phantoms, about 1/mm; absorption chosen for a diffuse reflectance of
-# 0.81, 0.67 and 0.48, so that a finger's breadth still glows.
+# 0.77, 0.63 and 0.46: a finger's breadth, 15 mm, still transmits 14, 6 and 1 % by diffusion in a slab.
 WAX = Material("wax", sigma_a=(0.002, 0.008, 0.03), sigma_s_prime=(0.9, 1.0, 1.1), eta=1.44, roughness=0.4)
 
-# Angles of view, degrees: long lenses, as for portraits of small things.
-_FOV = 20.0
-_MARGIN = 1.08
+
+def _framed(objects: Sequence[Object], azimuth: float, elevation: float) -> PerspectiveCamera:
+    """The camera of a built-in scene: a long lens, as for portraits of small things."""
+    return framing(objects, azimuth=azimuth, elevation=elevation, fov=20.0)
 
 
 def slab(vertices: int | None = None) -> Scene:
     """a flat plate of marble with hard edges, lit from one side"""
     plate = Object(shapes.slab(vertices=vertices), material("marble"))
     light = DirectionalLight(direction=(0.75, -0.2, -0.63), irradiance=(4.2, 4.1, 4.0))
-    return Scene("slab", (plate,), (light,), _framing([plate], azimuth=52, elevation=16))
+    return Scene("slab", (plate,), (light,), _framed([plate], azimuth=52, elevation=16))
 
 
 def sphere(vertices: int | None = None) -> Scene:
     """a ball of skin-like medium, half of it in the light"""
     ball = Object(shapes.sphere(vertices=vertices), material("skin1"))
     light = DirectionalLight(direction=(-0.9, -0.3, -0.3), irradiance=(5.0, 4.9, 4.7))
-    return Scene("sphere", (ball,), (light,), _framing([ball], azimuth=0, elevation=0))
+    return Scene("sphere", (ball,), (light,), _framed([ball], azimuth=0, elevation=0))
 
 
 def ear(vertices: int | None = None) -> Scene:
@@ -52,7 +52,7 @@ def ear(vertices: int | None = None) -> Scene:
     key = RectLight((-150, 120, 260), (0.46, -0.37, -0.8), (0, 1, 0), 120, 120, radiance=(17, 16, 15.5), samples=6)
     back = SphereLight((70, 60, -190), 22, radiance=(330, 310, 290), samples=6)
     fill = EnvironmentLight((0.08, 0.09, 0.11))
-    return Scene("ear", (auricle,), (key, back, fill), _framing([auricle], azimuth=-8, elevation=4))
+    return Scene("ear", (auricle,), (key, back, fill), _framed([auricle], azimuth=-8, elevation=4))
 
 
 def milk(vertices: int | None = None) -> Scene:
@@ -60,7 +60,7 @@ def milk(vertices: int | None = None) -> Scene:
     splash = Object(shapes.milk(vertices), material("wholemilk"))
     light = PointLight((160, 190, -170), intensity=(0.30, 0.30, 0.30))
     sky = EnvironmentLight((0.20, 0.23, 0.28))
-    return Scene("milk", (splash,), (light, sky), _framing([splash], azimuth=15, elevation=24))
+    return Scene("milk", (splash,), (light, sky), _framed([splash], azimuth=15, elevation=24))
 
 
 def gyroid(vertices: int | None = None) -> Scene:
@@ -69,7 +69,7 @@ def gyroid(vertices: int | None = None) -> Scene:
     green = PointLight((-150, 60, 60), intensity=(0.015, 0.105, 0.030))
     pink = PointLight((140, 60, 10), intensity=(0.120, 0.030, 0.075))
     room = EnvironmentLight((0.08, 0.08, 0.09))
-    return Scene("gyroid", (shell,), (green, pink, room), _framing([shell], azimuth=24, elevation=18))
+    return Scene("gyroid", (shell,), (green, pink, room), _framed([shell], azimuth=24, elevation=18))
 
 
 def statue(vertices: int | None = None) -> Scene:
@@ -78,7 +78,7 @@ def statue(vertices: int | None = None) -> Scene:
     window = RectLight((-330, 330, 280), (0.64, -0.49, -0.59), (0, 1, 0), 180, 240, radiance=(17, 16.5, 15.5))
     behind = DirectionalLight(direction=(-0.5, -0.35, 0.79), irradiance=(1.6, 1.7, 1.9))
     room = EnvironmentLight((0.09, 0.09, 0.10))
-    return Scene("statue", (figure,), (window, behind, room), _framing([figure], azimuth=18, elevation=8))
+    return Scene("statue", (figure,), (window, behind, room), _framed([figure], azimuth=18, elevation=8))
 
 
 def leaf(vertices: int | None = None) -> Scene:
@@ -89,7 +89,7 @@ def leaf(vertices: int | None = None) -> Scene:
         direction=(0.9, -0.35, -0.3), irradiance=(1.5, 1.6, 1.8)
     )  # from the side: the veins stand out
     sky = EnvironmentLight((0.25, 0.30, 0.38))
-    return Scene("leaf", (blade,), (sun, shine, sky), _framing([blade], azimuth=20, elevation=5))
+    return Scene("leaf", (blade,), (sun, shine, sky), _framed([blade], azimuth=20, elevation=5))
 
 
 def wave(vertices: int | None = None) -> Scene:
@@ -98,7 +98,7 @@ def wave(vertices: int | None = None) -> Scene:
     lamp = SphereLight((90, 70, -120), 15, radiance=(170, 165, 155))
     key = DirectionalLight(direction=(0.5, -0.5, -0.7), irradiance=(1.4, 1.45, 1.5))
     poses = [finger.at(time_s) for time_s in np.linspace(0, BendAndSwell().period_s, 9)]
-    return Scene("wave", (finger,), (lamp, key), _framing(poses, azimuth=0, elevation=8))
+    return Scene("wave", (finger,), (lamp, key), _framed(poses, azimuth=0, elevation=8))
 
 
 def crowd(vertices: int | None = None, copies: int = 4) -> Scene:
@@ -119,7 +119,7 @@ def crowd(vertices: int | None = None, copies: int = 4) -> Scene:
     key = DirectionalLight(direction=(0.55, -0.5, -0.67), irradiance=(3.4, 3.3, 3.1))
     rim = DirectionalLight(direction=(-0.75, -0.2, 0.63), irradiance=(2.4, 2.5, 2.8))
     room = EnvironmentLight((0.15, 0.15, 0.17))
-    return Scene("crowd", tuple(heads), (key, rim, room), _framing(heads, azimuth=10, elevation=12))
+    return Scene("crowd", tuple(heads), (key, rim, room), _framed(heads, azimuth=10, elevation=12))
 
 
 SCENES: dict[str, Callable[[int | None], Scene]] = {
@@ -134,20 +134,3 @@ SCENES: dict[str, Callable[[int | None], Scene]] = {
     "crowd": crowd,
 }
 """Each scene by its name, as a function of the vertex count (None: the shape's default)."""
-
-
-def _framing(objects: Sequence[Object], *, azimuth: float, elevation: float) -> PerspectiveCamera:
-    """A camera with all objects in a square image, from an azimuth and elevation in degrees, with a small margin."""
-    points = np.concatenate([o.placed for o in objects])
-    camera = PerspectiveCamera.orbit((0, 0, 0), 1.0, azimuth, elevation, fov=_FOV)
-    turn = camera.view()[:3, :3]
-    right, up, towards = turn @ points.T
-    slope = math.tan(math.radians(_FOV) / 2) / _MARGIN
-    # Both edges of the image touch the object where the middle of its extremes, widened by depth, is the target.
-    ends = [((a + slope * towards).max(), (-a + slope * towards).max()) for a in (right, up)]
-    distance = max((high + low) / (2 * slope) for high, low in ends)
-    target = turn.T @ np.array([*((high - low) / 2 for high, low in ends), 0.0])
-    eye = target + turn[2] * distance
-    # The point looked at, about which a turning camera goes, lies at the middle of the object's depth.
-    target = target + turn[2] * (towards.max() + towards.min()) / 2
-    return replace(camera, eye=tuple(eye.tolist()), target=tuple(target.tolist()))

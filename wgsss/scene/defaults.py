@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,18 +20,26 @@ DEFAULT_LIGHTS: tuple[Light, ...] = (
     DirectionalLight((-0.4, -0.3, 1.0), (1.6, 1.6, 1.6)),
     EnvironmentLight((0.1, 0.1, 0.1)),
 )
-_AZIMUTH, _ELEVATION = 20.0, 10.0  # degrees: nearly from the front, but no symmetric thing looks flat
 _MARGIN = 1.08  # of the width of the image, over what the objects fill
 
 
-def framing(objects: Iterable[Object]) -> PerspectiveCamera:
-    """A camera in front of the objects, a little to the right and above, with all of them in a square image."""
+def framing(
+    objects: Iterable[Object], *, azimuth: float = 20.0, elevation: float = 10.0, fov: float = 30.0
+) -> PerspectiveCamera:
+    """A camera with all objects in a square image, with a small margin; angles in degrees.
+
+    By default nearly from the front, but a little to the right and above: no symmetric thing looks flat.
+    """
     points = np.concatenate([o.placed for o in objects])
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = (low + high) / 2
-    target = (float(middle[0]), float(middle[1]), float(middle[2]))
-    camera = PerspectiveCamera.orbit(target, float((high - low).max()), _AZIMUTH, _ELEVATION)
-    x, y, z = camera.view()[:3, :3] @ (points - middle).T
-    slope = math.tan(math.radians(camera.fov) / 2) / _MARGIN
-    distance = float((np.maximum(np.abs(x), np.abs(y)) / slope + z).max())
-    return PerspectiveCamera.orbit(target, distance, _AZIMUTH, _ELEVATION)
+    camera = PerspectiveCamera.orbit((0, 0, 0), 1.0, azimuth, elevation, fov=fov)
+    turn = camera.view()[:3, :3]
+    right, up, towards = turn @ points.T
+    slope = math.tan(math.radians(fov) / 2) / _MARGIN
+    # Both edges of the image touch the object where the middle of its extremes, widened by depth, is the target.
+    ends = [((a + slope * towards).max(), (-a + slope * towards).max()) for a in (right, up)]
+    distance = max((high + low) / (2 * slope) for high, low in ends)
+    target = turn.T @ np.array([*((high - low) / 2 for high, low in ends), 0.0])
+    eye = target + turn[2] * distance
+    # The point looked at, about which a turning camera goes, lies at the middle of the object's depth.
+    target = target + turn[2] * (towards.max() + towards.min()) / 2
+    return replace(camera, eye=tuple(eye.tolist()), target=tuple(target.tolist()))
