@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections import defaultdict
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -81,17 +82,30 @@ def texel_bytes(texture_format: str) -> int:
 def adapters() -> list[Any]:
     """The Vulkan adapters of this machine."""
     import wgpu
-    from wgpu.backends.wgpu_native import extras
 
-    if not getattr(adapters, "instance", False):  # other backends are never used, and slow to ask
-        extras.set_instance_extras(backends=["Vulkan"])
-        adapters.instance = True  # type: ignore[attr-defined]
+    _prepare_wgpu()
     wanted = os.environ.get("WGPUPY_WGPU_ADAPTER_NAME", "")
     return [
         a
         for a in wgpu.gpu.enumerate_adapters_sync()
         if wanted in a.info["device"] and a.info["backend_type"] == "Vulkan"
     ]
+
+
+@lru_cache(maxsize=1)
+def _prepare_wgpu() -> None:
+    """Once, before anything is asked of wgpu."""
+    from cffi import CDefError
+    from wgpu.backends.wgpu_native import extras, ffi
+
+    extras.set_instance_extras(backends=["Vulkan"])  # others are never used, and slow to ask
+    # Its calls have the C types that they need parsed one by one, 15 ms each and a second in all, since each time all
+    # names are declared anew. Parsed in one go they take as long as three. Without these internals it is only slower.
+    with suppress(AttributeError, CDefError):
+        names = [name.split()[1] for name in ffi._parser._declarations if name.startswith("typedef WGPU")]
+        pointers = ffi.typeof(f"void(*)({', '.join(f'{name} *' for name in names)})").args
+        for name, pointer in zip(names, pointers, strict=True):
+            ffi._parsed_types.setdefault(f"{name} *", (pointer, False))
 
 
 @dataclass(frozen=True)
