@@ -219,9 +219,10 @@ def test_shadow_of_a_square_is_sharp_and_does_not_leak(gpu, gap):
         stage = Stage(gpu, scene)
         stage.bodies[0].unwrap()
         graph = Graph(gpu)
-        handle = shared.irradiance_texels(shared.begin(graph, stage, (8, 8)), stage.bodies[0], 256)
+        frame = shared.begin(graph, stage, (8, 8))
+        handle = shared.irradiance_texels(frame, stage.bodies[0], 256)
         graph.run(handle)
-        got = graph.read(handle)[..., 0]
+        got = graph.read(handle)[..., 0] * frame.lighting.unit
         x = ((np.arange(256) + 0.5) / 256 - 0.01) / 0.98 * 40 - 20
         x, z = np.meshgrid(x, x)
     else:
@@ -262,6 +263,7 @@ def test_texels_vertices_and_pixels_agree(gpu):
                                 shared.irradiance_vertices(frame, body))  # fmt: skip
     graph.run(pixels, texels, vertices, frame.gbuffer.where_seen)
     pixels, texels, vertices, seen = (graph.read(h) for h in (pixels, texels, vertices, frame.gbuffer.where_seen))
+    texels = texels * frame.lighting.unit
     place = body.rest.mesh.positions[surface.vertex]
     inside = np.abs(place[:, [0, 2]]).max(axis=1) < 9
     column = ((place[:, 0] / 20 + 0.5) * 256 - 0.5)[inside]

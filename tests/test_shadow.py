@@ -19,10 +19,11 @@ def ground(gpu, scene):
     stage = Stage(gpu, scene)
     stage.bodies[0].unwrap()
     graph = Graph(gpu)
-    handle = shared.irradiance_texels(shared.begin(graph, stage, (8, 8)), stage.bodies[0], MAP)
+    frame = shared.begin(graph, stage, (8, 8))
+    handle = shared.irradiance_texels(frame, stage.bodies[0], MAP)
     graph.run(handle)
     t = (((np.arange(MAP) + 0.5) / MAP - 0.01) / 0.98 - 0.5) * 40
-    return graph.read(handle)[..., 0], *np.meshgrid(t, t)
+    return graph.read(handle)[..., 0] * frame.lighting.unit, *np.meshgrid(t, t)
 
 
 @pytest.mark.parametrize("angle", [20, 45, 70])

@@ -62,6 +62,16 @@ def emitters(lights: Sequence[Light], points: Array) -> Emitters:
     return Emitters(found, views, size)
 
 
+def irradiance_of(found: Emitters, points: Array) -> float:
+    """About what all emitters together give a surface that faces them, W/m^2, of the brightest channel."""
+    centre, radius = _ball(points)
+    total = 0.0
+    for light in found.lights:
+        distance = max(float(np.linalg.norm(centre - light["position"])), radius) / 1000  # m
+        total += float(np.max(light["power"])) / (1.0 if light["kind"] == DIRECTIONAL else distance**2)
+    return total
+
+
 def _emitters(light: Light, points: Array) -> list[dict[str, Any]]:
     """Position, kind, power and normal of a light's emitters."""
     nowhere = (0.0, 0.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.environment import rho_dt_table
-from wgsss.emitters import emitters
+from wgsss.emitters import emitters, irradiance_of
 from wgsss.graph import Graph, Handle
 from wgsss.scene import OrthographicCamera, Scene
 from wgsss.scene.scene import TONE_MAPS
@@ -32,7 +33,8 @@ class View:
 class Frame:
     """What methods draw from: the stage, the view, the g-buffer and the lights.
 
-    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps.
+    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps, and `unit`: a
+    power of two, W/m^2, near the scene's irradiance, in which half floats hold it.
     """
 
     graph: Graph
@@ -117,7 +119,8 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
 
 def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
     """Lights and the shadow maps of those that cast shadows."""
-    found = emitters(stage.scene.lights, _world_points(stage.scene))
+    points = _world_points(stage.scene)
+    found = emitters(stage.scene.lights, points)
     side = found.shadow_size
     if found.views:
         maps: Any = graph.texture("shadow_maps", (side, side, len(found.views)), "depth32float")
@@ -136,7 +139,9 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
                 )
     else:
         maps = stage.gpu.no_depth
-    return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps)
+    brightness = irradiance_of(found, points) + math.pi * stage.sky
+    unit = 2.0 ** round(math.log2(brightness)) if brightness > 0 else 1.0
+    return SimpleNamespace(lights=found.lights, views=found.views, shadow_maps=maps, unit=unit)
 
 
 def irradiance_pixels(frame: Frame) -> Handle:
@@ -156,11 +161,12 @@ def irradiance_pixels(frame: Frame) -> Handle:
 
 
 def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
-    """L_d, W/m^2, over a body's atlas, times the share of its base colour that is applied before diffusion."""
+    """L_d over a body's atlas, in `lighting.unit`, times the base colour's share that is applied before diffusion."""
     return frame.graph.draw(
         "frame/irradiance_texels",
         size=(map_size, map_size),
         indices=body.indices,
+        params={"unit": frame.lighting.unit},
         vertices=body.vertices,
         environment=body.environment.irradiance,
         **vars(body.maps),

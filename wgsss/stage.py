@@ -58,6 +58,11 @@ class Stage:
         """The environments that light the scene."""
         return [light for light in self.scene.lights if isinstance(light, EnvironmentLight)]
 
+    @property
+    def sky(self) -> float:
+        """The mean radiance of the environments, W/(m^2 sr), of the brightest channel."""
+        return self.shared("sky", lambda: sum(float(e.pixels().mean(axis=(0, 1)).max()) for e in self.environments()))
+
 
 class Body:
     """One object of a stage, with its buffers and textures."""

@@ -89,7 +89,9 @@ def diffused_map(gpu, scene, monkeypatch, map_size=512):
     frame = shared.begin(graph, stage, (8, 8))
     maps = method.blurs(frame, body)
     graph.run(*maps)
-    M = sum(graph.read(m)[..., :3].astype(float) * w for m, w in zip(maps, SKIN_GAUSSIANS.weights, strict=True))
+    M = frame.lighting.unit * sum(
+        graph.read(m)[..., :3].astype(float) * w for m, w in zip(maps, SKIN_GAUSSIANS.weights, strict=True)
+    )
     return M, body, texture_space.atlas(body, map_size)
 
 
@@ -152,6 +154,18 @@ def test_vanishing_width_is_lambert(gpu):
     blurred = Renderer(scene, TextureSpace(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
     sharp = Renderer(scene, Lambert(), (64, 64), gpu).frame(aovs=["M_front"]).aovs["M_front"]
     np.testing.assert_allclose(blurred, sharp, rtol=0.02, atol=0.02)
+
+
+@pytest.mark.parametrize("power", [1e-9, 1.0, 1e6])
+def test_faint_and_bright_light_give_the_same_picture(gpu, power):
+    """Half floats end at 65504 and fade out below 1e-7: the maps are in a unit near the scene's irradiance."""
+    pictures = []
+    for level in (1.0, power):
+        light = DirectionalLight((-1, -0.5, 0.2), (level, level, level))
+        scene = lit(light, mesh=sphere(10.0, 1000), material=SKIN, camera=replace(ABOVE, height=24))
+        image = Renderer(scene, TextureSpace(map_size=128), (48, 48), gpu).frame(aovs=["M_front"])
+        pictures.append(image.aovs["M_front"] / level)
+    np.testing.assert_allclose(pictures[1], pictures[0], rtol=2e-3, atol=1e-4)
 
 
 def test_the_base_colour_may_be_applied_before_or_after(gpu):

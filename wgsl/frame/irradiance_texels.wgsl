@@ -5,6 +5,10 @@ import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::targets::{RGBA16Float};
 
+struct Params {
+    unit: f32, // W/m^2 that a value of 1 stands for
+}
+
 @group(0) @binding(0) var<uniform> surface: Surface;
 @group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
@@ -18,6 +22,7 @@ import package::targets::{RGBA16Float};
 @group(0) @binding(10) var normal_map: texture_2d<f32>;
 @group(0) @binding(11) var specular_map: texture_2d<f32>;
 @group(0) @binding(12) var linear_repeat: sampler;
+@group(0) @binding(13) var<uniform> params: Params;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -27,7 +32,7 @@ struct Varying {
 }
 
 struct Texel {
-    @location(0) irradiance: RGBA16Float, // L_d times the base colour's share before diffusion; 1 where covered
+    @location(0) irradiance: RGBA16Float, // in params.unit: L_d times the base colour's share before diffusion; 1 where covered
 }
 
 @vertex
@@ -61,5 +66,5 @@ fn fs(in: Varying) -> Texel {
         }
         irradiance += transmitted(at, n, specular, lit, rho_dt_table);
     }
-    return Texel(vec4f(irradiance * color_before(surface, color), 1.0));
+    return Texel(vec4f(irradiance / params.unit * color_before(surface, color), 1.0));
 }

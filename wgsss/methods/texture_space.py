@@ -73,7 +73,7 @@ class TextureSpace:
         for body in frame.stage.bodies:
             weights = np.zeros((_SLOTS, 4))
             blurred = self.blurs(frame, body)
-            weights[: len(blurred), :3] = self.profile(body).weights
+            weights[: len(blurred), :3] = self.profile(body).weights * frame.lighting.unit
             maps: dict[str, Any] = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
             M_front = frame.graph.draw(
                 "texture_space/gather",
@@ -87,7 +87,7 @@ class TextureSpace:
         return Diffused(M_front)
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:
-        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first."""
+        """A body's irradiance map, in `lighting.unit`, blurred by each Gaussian of its profile, narrowest first."""
         graph, full = frame.graph, atlas(body, self.map_size)
         irradiance = shared.irradiance_texels(frame, body, self.map_size)
         size = (self.map_size, self.map_size)
