@@ -15,6 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.methods import METHODS, make_method
@@ -79,9 +81,11 @@ def commands() -> None:
 def encoding(gpu: Gpu) -> None:
     """What a graph costs Python. The passes draw two texels, so that the device has next to nothing to do."""
 
+    black = gpu.texture(np.zeros((1, 2, 4)), "rgba32float")
+
     def frame() -> None:
         graph = Graph(gpu)
-        value = graph.dispatch("frame/rho_dt", size=(2, 1), params={"alpha": 0.1, "eta": 1.3})
+        value = graph.draw("frame/tone_map", size=(2, 1), radiance=black, params={"scale": 1.0, "curve": 0})
         for _ in range(PASSES - 1):
             value = graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})
         graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})  # not wanted, hence dropped
