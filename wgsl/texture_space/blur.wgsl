@@ -38,7 +38,7 @@ const BISECTIONS: u32 = 8u; // to a texel, of a step of up to 256
 
 // What maps blur by themselves, as variances in texels^2.
 const SPLINE: f32 = 1.0 / 3.0; // the spline that the result is read through (gather.wgsl)
-const BOX: f32 = 1.0 / 12.0;   // a texel of the irradiance is a mean over its area; later, taps between texels add as much
+const BOX: f32 = 1.0 / 12.0;   // a texel of the irradiance, which is a mean over its area
 const HALVING: f32 = 0.25;     // reading a larger map between its texels
 
 @vertex
@@ -112,7 +112,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     let scale = length(texels_per_mm);
     let texel = 1.0 / scale;
     let source_texel = texel / params.finer;
-    let own = BOX + select(0.0, HALVING, params.finer > 1.0);
+    let own = select(0.0, BOX, params.reached == 0.0) + select(0.0, HALVING, params.finer > 1.0);
     let reached = max(params.reached - SPLINE * source_texel * source_texel, 0.0) + own * source_texel * source_texel;
     let variance = params.variance - SPLINE * texel * texel - reached;
     let spacing = max(source_texel, SPACING * sqrt(reached));
