@@ -60,7 +60,6 @@ FORMATS: dict[str, tuple[str, int]] = {  # texture format -> numpy scalar, chann
 }
 
 SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what it does
-    "nearest_clamp": {},
     "linear_clamp": {"mag_filter": "linear", "min_filter": "linear"},
     "linear_repeat": {
         "mag_filter": "linear",

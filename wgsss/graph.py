@@ -61,8 +61,6 @@ class Graph:
         count: int = 3,
         into: Handle | Mapping[str, Handle] | None = None,
         depth_buffer: Handle | Literal["new"] | None = None,
-        depth_compare: str = "less",
-        depth_write: bool = True,
         layer: int = 0,
         constants: Mapping[str, float] | None = None,
         label: str = "",
@@ -73,7 +71,7 @@ class Graph:
         Args:
             size: of the targets made, in texels; by default that of `into`, `depth_buffer` or the first texture bound.
             into: targets to draw onto instead of new, cleared ones (a handle, or handles by output name).
-            depth_buffer: "new" for a cleared depth buffer, or one to test against and, with `depth_write`, write.
+            depth_buffer: "new" for a cleared depth buffer, or one to test against and write.
             layer: of array textures given as `into` or `depth_buffer`.
             bindings: the module's bindings by name: handles, GPU resources that persist, or values to pack and upload.
 
@@ -99,11 +97,8 @@ class Graph:
             targets.append((name, item.writes[name].layer(layer) in item.writes[name].resource.drawn))
         if depth_buffer == "new":
             self._write_new(item, "depth", Resource(f"{item.name}.depth", "depth32float", (*size, 1)))
-        elif isinstance(depth_buffer, Handle) and depth_write:
-            self._write_on(item, "depth", depth_buffer)
         elif isinstance(depth_buffer, Handle):
-            item.reads["depth"] = self._checked(depth_buffer)
-        depth_name = "depth" if depth_buffer is not None else None
+            self._write_on(item, "depth", depth_buffer)
         written = item.writes.get("depth")
         keep_depth = written is not None and written.layer(layer) in written.resource.drawn
         import wgpu
@@ -113,7 +108,7 @@ class Graph:
             handle.resource.drawn.add(handle.layer(layer))
         if indices is not None and count == 3:
             count = indices.size // 4
-        item.state = Draw(tuple(targets), depth_name, depth_compare, depth_write, keep_depth, layer, indices, count)
+        item.state = Draw(tuple(targets), keep_depth, layer, indices, count)
         return self._outputs(item)
 
     def dispatch(
@@ -279,10 +274,6 @@ class Graph:
             return self.gpu.read_texture(handle.resource.gpu)
         raw = self.gpu.queue.read_buffer(handle.resource.gpu, 0, handle.resource.nbytes)
         return np.frombuffer(raw, handle.resource.layout.dtype)
-
-    def gpu_texture(self, handle: Handle) -> Any:
-        """The texture behind a wanted handle after `run`, held until this graph is dropped."""
-        return handle.resource.gpu
 
     def _allocate(self, resource: Resource) -> None:
         import wgpu

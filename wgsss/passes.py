@@ -76,10 +76,7 @@ class Pass:
 @dataclass(frozen=True)
 class Draw:
     targets: tuple[tuple[str, bool], ...]  # name in `writes`, whether earlier content is kept
-    depth: str | None  # name in `writes` or, where only tested, in `reads`
-    depth_compare: str
-    depth_write: bool
-    keep_depth: bool
+    keep_depth: bool  # of the depth buffer, where "depth" is in `writes`
     layer: int
     indices: Any
     count: int
@@ -110,12 +107,8 @@ def pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
     state: Draw = item.state
     formats = tuple(item.writes[name].format for name, _ in state.targets)
     depth = None
-    if state.depth:
-        depth = {
-            "format": "depth32float",
-            "depth_compare": state.depth_compare,
-            "depth_write_enabled": state.depth_write,
-        }
+    if "depth" in item.writes:
+        depth = {"format": "depth32float", "depth_compare": "less", "depth_write_enabled": True}
 
     def make() -> Any:
         fragment = None
@@ -131,7 +124,7 @@ def pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
             label=module.name,
         )
 
-    return (*key, formats, depth and (state.depth_compare, state.depth_write)), make
+    return (*key, formats, depth is not None), make
 
 
 def _stage(gpu: Gpu, module: Module, stage: str, constants: dict[str, float]) -> dict[str, Any]:
@@ -227,17 +220,13 @@ def _encode_draw(gpu: Gpu, encoder: Any, item: Pass, pipeline: Any, group: Any, 
         for name, kept in state.targets
     ]
     depth = None
-    if state.depth:
-        handle = item.writes.get(state.depth) or item.reads[state.depth]
-        depth = {"view": view(handle)}
-        if state.depth_write:
-            depth |= {
-                "depth_load_op": "load" if state.keep_depth else "clear",
-                "depth_store_op": "store",
-                "depth_clear_value": 1.0,
-            }
-        else:
-            depth |= {"depth_read_only": True}
+    if "depth" in item.writes:
+        depth = {
+            "view": view(item.writes["depth"]),
+            "depth_load_op": "load" if state.keep_depth else "clear",
+            "depth_store_op": "store",
+            "depth_clear_value": 1.0,
+        }
     render = encoder.begin_render_pass(
         color_attachments=colors, depth_stencil_attachment=depth, label=item.name, **stamps
     )
