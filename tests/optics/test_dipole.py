@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from wgsss.errors import InputError
-from wgsss.optics import Dipole, diffuse_fresnel
+from wgsss.optics import BetterDipole, Dipole, Profile, diffuse_fresnel
+from wgsss.optics.fresnel import boundary, three_c2, two_c1
 
 
 def test_total_is_the_published_closed_form(measured):
@@ -32,7 +33,7 @@ def test_reflectance_is_the_flux_of_two_sources_through_the_surface(skin):
     """004 eq. 29 and 26: R = D dphi/dn, here from the fluence by central differences."""
     diffusion = 1 / (3 * skin.sigma_t_prime)
     z_r = 1 / skin.sigma_t_prime
-    z_b = 2 * skin.boundary * diffusion
+    z_b = 2 * boundary(skin.eta) * diffusion
 
     def fluence(r, depth):
         d_r, d_v = np.hypot(r, depth - z_r), np.hypot(r, depth + z_r + 2 * z_b)
@@ -46,6 +47,94 @@ def test_reflectance_is_the_flux_of_two_sources_through_the_surface(skin):
         np.testing.assert_allclose(fluence(r, -z_b), 0, atol=1e-12)  # dark on the extrapolated boundary
         slope = (fluence(r, 1e-5) - fluence(r, -1e-5)) / 2e-5
         np.testing.assert_allclose(skin.reflectance(r), diffusion * slope, rtol=1e-6)
+
+
+def test_range_of_skin1_is_that_of_equation_40(skin):
+    np.testing.assert_allclose(skin.range(0.01), [13.67, 5.76, 2.99], atol=0.005)
+
+
+def test_range_without_absorption_is_algebraic():
+    """Beyond r a share (z_r + z_v) / 2r is left, to first order: 24 mm for Spectralon's red."""
+    spectralon = Dipole((0, 0, 0), (11.6, 20.4, 14.9), 1.3)
+    z_v = spectralon.mean_free_path * (1 + 4 / 3 * boundary(1.3))
+    np.testing.assert_allclose(spectralon.range(1e-4), (spectralon.mean_free_path + z_v) / 2e-4, rtol=1e-6)
+    assert spectralon.range(0.01)[0] == pytest.approx(24, abs=0.5)
+
+
+@pytest.mark.parametrize("model", [Dipole, BetterDipole])
+@pytest.mark.parametrize("sigma_a", [(0.032, 0.17, 0.48), (0, 0, 0), (1e-8, 1e-6, 1e-4)])
+def test_closed_forms_are_the_integrals_of_reflectance(model, sigma_a):
+    profile = model(sigma_a, (0.74, 0.88, 1.01), 1.3)
+    r = np.array([0.0, 1e-3, 0.1, 1.0, 10.0, 40.0])
+    np.testing.assert_allclose(profile.beyond(r), Profile.beyond(profile, r), atol=2e-8)
+    np.testing.assert_allclose(profile.line_spread(-r), Profile.line_spread(profile, r), rtol=5e-8)
+    np.testing.assert_allclose(profile.enclosed(profile.range(0.02)).diagonal(), 0.98, rtol=1e-12)
+
+
+def test_better_dipole_without_absorption_returns_everything():
+    np.testing.assert_allclose(BetterDipole((0, 0, 0), (1, 2, 3), 1.4).total, 1.0, rtol=1e-10)
+
+
+def test_better_dipole_total_is_the_closed_form():
+    """The integral of d'Eon's R, written out."""
+    sigma_a, sigma_s_prime, eta = np.array([0.032, 0.17, 0.48]), np.array([0.74, 0.88, 1.01]), 1.3
+    sigma_t_prime = sigma_a + sigma_s_prime
+    D = (2 * sigma_a + sigma_s_prime) / (3 * sigma_t_prime**2)
+    sigma_tr, z_r = np.sqrt(sigma_a / D), 1 / sigma_t_prime
+    z_v = z_r + 4 * D * (1 + three_c2(eta)) / (1 - two_c1(eta))
+    near, far = np.exp(-sigma_tr * z_r), np.exp(-sigma_tr * z_v)
+    phi = (1 - two_c1(eta)) / 4 * (near - far) / (2 * D * sigma_tr)
+    wanted = (sigma_s_prime / sigma_t_prime) ** 2 * (phi + (1 - three_c2(eta)) / 2 * (near + far) / 2)
+    np.testing.assert_allclose(BetterDipole(sigma_a, sigma_s_prime, eta).total, wanted, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("eta", "first", "second"), [(1.2, 0.336306, 0.198496), (1.3, 0.444457, 0.300267), (1.5, 0.596346, 0.464431)]
+)
+def test_moments_are_those_of_fresnel(eta, first, second):
+    assert two_c1(eta) == pytest.approx(first, abs=1e-3)
+    assert three_c2(eta) == pytest.approx(second, abs=4e-3)
+
+
+@pytest.mark.parametrize("model", [Dipole, BetterDipole])
+def test_inversion_finds_the_medium_again(model):
+    medium = model((0.0021, 0.17, 0.48), (2.19, 0.88, 1.01), 1.5)
+    for name, length in (("mean_free_path", 1 / medium.sigma_t_prime), ("diffuse_mean_free_path", 1 / medium.sigma_tr)):
+        found = model.from_reflectance(medium.total, eta=1.5, **{name: length})
+        np.testing.assert_allclose(found.sigma_a, medium.sigma_a, rtol=1e-9)
+        np.testing.assert_allclose(found.sigma_s_prime, medium.sigma_s_prime, rtol=1e-9)
+
+
+def test_inversion_of_the_published_reflectance_of_marble():
+    """Jensen et al. 2001 give 0.83 for red with sigma_s' 2.19 and sigma_a 0.0021 1/mm."""
+    marble = Dipole.from_reflectance(
+        (0.8302, 0.791, 0.7526), eta=1.5, mean_free_path=1 / np.array([2.1921, 2.6241, 3.0071])
+    )
+    np.testing.assert_allclose(marble.sigma_a, [0.0021, 0.0041, 0.0071], rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"reflectance": (0.5, 1.0, 0.5), "mean_free_path": (1, 1, 1)}, "reflectance of green must be below 1"),
+        ({"reflectance": (0.5, 0.5, 0), "mean_free_path": (1, 1, 1)}, "reflectance of blue must be above 0"),
+        ({"reflectance": (0.5, 0.5, 0.5), "mean_free_path": (0, 1, 1)}, "mean_free_path of red must be above 0"),
+        ({"reflectance": (0.5, 0.5, 0.5)}, "one of them"),
+        ({"reflectance": (0.5, 0.5, 0.5), "radius": (1, 1, 1)}, "one of them"),
+    ],
+)
+def test_bad_inversions_are_told(arguments, says):
+    with pytest.raises(InputError, match=says):
+        Dipole.from_reflectance(**arguments)
+
+
+def test_bad_distances_are_told(skin):
+    for r in (-1.0, [0.1, np.nan]):
+        with pytest.raises(InputError, match="distances must be at least 0"):
+            skin.reflectance(r)
+    for eps in (0.0, 1.0, np.nan):
+        with pytest.raises(InputError, match="between 0 and 1"):
+            skin.range(eps)
 
 
 def test_halving_lengths_scales_reflectance_by_four(skin):
@@ -64,12 +153,6 @@ def test_without_absorption_everything_returns():
     assert np.all(Dipole((0, 0, 0), (11.6, 20.4, 14.9)).total == 1.0)
 
 
-def test_without_scattering_nothing_returns():
-    black = Dipole((1, 1, 1), (0, 0, 0))
-    assert np.all(black.total == 0.0)
-    assert np.all(black.reflectance([0.0, 1.0]) == 0.0)
-
-
 @pytest.mark.parametrize(
     ("eta", "exact"),
     [(1 / 1.5, 0.091778), (1 / 1.3, 0.061132), (1.0, 0.0), (1.2, 0.336306), (1.3, 0.444457), (1.5, 0.596346)],
@@ -82,9 +165,11 @@ def test_diffuse_fresnel_is_the_average_of_fresnel(eta, exact):
     ("sigma_a", "sigma_s_prime", "eta", "says"),
     [
         ((0, 0), (1, 1, 1), 1.3, "sigma_a must be three numbers"),
-        ((0, 0, -1), (1, 1, 1), 1.3, "sigma_a must be three numbers"),
-        ((0, 0, 0), (1, np.nan, 1), 1.3, "sigma_s_prime must be three numbers"),
-        ((0, 1, 1), (0, 1, 1), 1.3, "both 0"),
+        ((0, 0, -1), (1, 1, 1), 1.3, r"sigma_a of blue must be at least 0 \(1/mm\), not -1"),
+        ((0, 0, 0), (1, np.nan, 1), 1.3, "sigma_s_prime of green must be above 0"),
+        ((0, 0, 0), (np.inf, 1, 1), 1.3, "sigma_s_prime of red must be above 0 .*, not inf"),
+        ((0, 1, 1), (0, 1, 1), 1.3, "sigma_s_prime of red must be above 0"),
+        ((0, 1, 1), "abc", 1.3, "sigma_s_prime must be three numbers"),
         ((1, 1, 1), (1, 1, 1), 0.9, "eta"),
         ((1, 1, 1), (1, 1, 1), np.nan, "eta"),
     ],

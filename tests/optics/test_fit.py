@@ -93,10 +93,11 @@ def test_permuting_channels_permutes_weights(skin):
 
 
 def test_black_channels_stay_black():
-    half_black = fit_gaussians(Dipole((0.1, 1.0, 0.1), (1.0, 0.0, 2.0)))
+    two = SumOfGaussians([0.2, 3.0], [[0.5, 0.0, 0.1], [0.1, 0.0, 0.3]])
+    half_black = fit_gaussians(Opaque(two), 3)
     assert np.all(half_black.weights[:, 1] == 0.0)
     assert np.all(half_black.total[[0, 2]] > 0.0)
-    assert np.all(fit_gaussians(Dipole((1, 1, 1), (0, 0, 0))).total == 0.0)
+    assert np.all(fit_gaussians(Opaque(SumOfGaussians([1.0], np.zeros((1, 3))))).total == 0.0)
 
 
 def test_no_gaussians_is_told(skin):

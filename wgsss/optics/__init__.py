@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from wgsss.optics.dipole import Dipole, diffuse_fresnel
-from wgsss.optics.fit import Profile, fit_error, fit_gaussians
+from wgsss.optics.dipole import BetterDipole, Dipole
+from wgsss.optics.fit import fit_error, fit_gaussians
+from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
+from wgsss.optics.medium import Layer, Medium
+from wgsss.optics.profile import Profile
 
 __all__ = [
     "SKIN_GAUSSIANS",
+    "BetterDipole",
     "Dipole",
+    "Layer",
+    "Medium",
     "Profile",
     "SumOfGaussians",
     "diffuse_fresnel",

@@ -1,93 +1,106 @@
-"""The dipole diffusion profile of a half space (Jensen et al. 2001, as corrected by 004 eq. 30)."""
+"""Diffusion profiles of a half space by a real and a mirrored point source."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
+from wgsss.optics import fresnel, sources
+from wgsss.optics.medium import CHANNELS, Medium, coefficients
+from wgsss.optics.profile import Profile, distances, shares
 
 Array = NDArray[np.float64]
+Term = Callable[..., Array]
 
 
-@dataclass(frozen=True, eq=False)
-class Dipole:
-    """R(r) of a homogeneous half space under a pencil of light, by a real and a mirrored point source.
-
-    `sigma_a`: absorption (3,) in 1/mm. `sigma_s_prime`: reduced scattering (3,) in 1/mm.
-    `eta`: refractive index of the medium over that of its surroundings, >= 1. Raises InputError for anything else.
+class Dipole(Medium, Profile):
+    """The classical dipole (Jensen et al. 2001, as corrected by 004 eq. 30), of a `Medium` under air.
 
     The profile is per unit of flux that entered the medium: Fresnel losses on the way in and out are the renderer's.
     """
 
-    sigma_a: Array
-    sigma_s_prime: Array
-    eta: float = 1.3
-
-    def __post_init__(self) -> None:
-        for name in ("sigma_a", "sigma_s_prime"):
-            sigma = np.array(getattr(self, name), dtype=np.float64)
-            if sigma.shape != (3,) or not np.all(np.isfinite(sigma)) or np.any(sigma < 0):
-                raise InputError(f"{name} must be three numbers >= 0 (1/mm), not {sigma.tolist()}")
-            sigma.flags.writeable = False
-            object.__setattr__(self, name, sigma)
-        if np.any(self.sigma_t_prime == 0):
-            raise InputError("sigma_a and sigma_s_prime are both 0 in a channel: nothing there for light to meet")
-        if not (np.isfinite(self.eta) and self.eta >= 1):
-            raise InputError(f"eta must be a number >= 1, not {self.eta}")
+    @property
+    def z_r(self) -> Array:
+        """Depth of the real source (3,) in mm: a mean free path."""
+        return self.mean_free_path
 
     @property
-    def sigma_t_prime(self) -> Array:
-        """Reduced extinction (3,) in 1/mm."""
-        return self.sigma_a + self.sigma_s_prime
-
-    @property
-    def mean_free_path(self) -> Array:
-        """1 / sigma_t' (3,) in mm; also z_r, the depth of the real source."""
-        return 1.0 / self.sigma_t_prime
-
-    @property
-    def albedo(self) -> Array:
-        """Reduced albedo alpha' (3,)."""
-        return self.sigma_s_prime / self.sigma_t_prime
-
-    @property
-    def sigma_tr(self) -> Array:
-        """Effective transport coefficient (3,) in 1/mm; 0 where nothing absorbs, and R then falls as 1/r^3."""
-        return np.sqrt(3.0 * self.sigma_a * self.sigma_t_prime)
-
-    @property
-    def boundary(self) -> float:
-        """A = (1 + Fdr) / (1 - Fdr), the internal reflection in the boundary condition (004 eq. 23)."""
-        fdr = diffuse_fresnel(self.eta)
-        return (1.0 + fdr) / (1.0 - fdr)
+    def z_v(self) -> Array:
+        """Height of the virtual source (3,) in mm: the real one mirrored in the extrapolated boundary, 2 A D above."""
+        return self.z_r + 4.0 * fresnel.boundary(self.eta) * self.diffusion
 
     @property
     def total(self) -> Array:
-        """Total diffuse reflectance R_d (3,): the integral of R over the plane, in closed form."""
-        absorbed = np.sqrt(3.0 * (1.0 - self.albedo))
-        return 0.5 * self.albedo * (1.0 + np.exp(-4.0 / 3.0 * self.boundary * absorbed)) * np.exp(-absorbed)
+        return self._radiated(sources.flux_beyond, sources.fluence_pair_beyond, 0.0)
 
     def reflectance(self, r: ArrayLike) -> Array:
-        """R(r) in 1/mm^2, shape (..., 3), at distances `r` (...) in mm: 004 eq. 30."""
-        r = np.asarray(r, dtype=np.float64)[..., None]
-        z_r = self.mean_free_path
-        z_v = z_r * (1.0 + 4.0 / 3.0 * self.boundary)
-        return self.albedo / (4.0 * np.pi) * (self._source(r, z_r) + self._source(r, z_v))
+        return self._radiated(sources.flux, sources.fluence_pair, r)
 
-    def _source(self, r: Array, z: Array) -> Array:
-        """The flux through the surface at `r` from a point source at distance `z` from it, times 4 pi."""
-        d = np.hypot(r, z)
-        return (self.sigma_tr * d + 1.0) * z * np.exp(-self.sigma_tr * d) / d**3
+    def beyond(self, r: ArrayLike) -> Array:
+        return shares(self._radiated(sources.flux_beyond, sources.fluence_pair_beyond, r), self.total)
+
+    def line_spread(self, x: ArrayLike) -> Array:
+        return self._radiated(sources.flux_along, sources.fluence_pair_along, np.abs(np.asarray(x)))
+
+    def _radiated(self, flux: Term, fluence: Term, r: ArrayLike) -> Array:
+        """What leaves, from what the two sources send through the surface."""
+        return self.albedo * self._both(flux, distances(r)[..., None])
+
+    def _both(self, flux: Term, r: Array) -> Array:
+        return flux(self.sigma_tr, self.z_r, r) + flux(self.sigma_tr, self.z_v, r)
+
+    @classmethod
+    def from_reflectance(cls, reflectance: ArrayLike, *, eta: float = 1.3, **length: ArrayLike) -> Self:
+        """The medium whose `total` is `reflectance` (3,), above 0 and below 1, under this model's boundary.
+
+        That boundary is a smooth one under air which reflects diffuse light inside as an index of `eta` does; `eta` = 1
+        is the index-matched case. Give one length (3,) in mm: `mean_free_path`, 1 / sigma_t', or
+        `diffuse_mean_free_path`, 1 / sigma_tr. Raises InputError, naming the channel, for what no medium has.
+        """
+        from scipy.optimize import brentq
+
+        if length.keys() not in ({"mean_free_path"}, {"diffuse_mean_free_path"}):
+            raise InputError("give mean_free_path or diffuse_mean_free_path, one of them")
+        wanted = coefficients("reflectance", reflectance, 0.0, True)
+        ((name, value),) = length.items()
+        scale = coefficients(name, value, 0.0, True, "mm")
+
+        def unit(albedo: float) -> Dipole:  # a mean free path of 1 mm
+            return cls(np.full(3, 1.0 - albedo), np.full(3, albedo), eta)
+
+        least, most = 1e-9, 1.0 - 1e-12
+        albedo = np.empty(3)
+        for i, R in enumerate(wanted):
+            if not unit(least).total[0] < R < unit(most).total[0]:
+                raise InputError(f"reflectance of {CHANNELS[i]} must be below {unit(most).total[0]:.4g}, not {R:g}")
+            albedo[i] = brentq(lambda a, R=R: unit(a).total[0] - R, least, most, xtol=1e-15, rtol=1e-14)
+        if name == "diffuse_mean_free_path":
+            scale = scale * np.array([unit(a).sigma_tr[0] for a in albedo])
+        return cls((1.0 - albedo) / scale, albedo / scale, eta)
 
 
-def diffuse_fresnel(eta: float) -> float:
-    """Fdr: the share of diffuse light reflected back inside at the boundary of a medium of relative index `eta`.
+class BetterDipole(Dipole):
+    """The better dipole (d'Eon 2012): Grosjean's diffusion coefficient, and a boundary that lets out fluence and flux.
 
-    Polynomial fits of Egan and Hilgeman, as in Jensen et al. 2001; `eta` is inside over outside. Within 0.002.
+    It holds light that was scattered more than once, hence its alpha'^2.
     """
-    if eta >= 1.0:
-        return -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
-    return -0.4399 + 0.7099 / eta - 0.3319 / eta**2 + 0.0636 / eta**3
+
+    @property
+    def diffusion(self) -> Array:
+        """Grosjean's diffusion coefficient (2 sigma_a + sigma_s') / (3 sigma_t'^2) (3,) in mm."""
+        return (2.0 * self.sigma_a + self.sigma_s_prime) / (3.0 * np.square(self.sigma_t_prime))
+
+    @property
+    def z_v(self) -> Array:
+        A = (1.0 + fresnel.three_c2(self.eta)) / (1.0 - fresnel.two_c1(self.eta))
+        return self.z_r + 4.0 * A * self.diffusion
+
+    def _radiated(self, flux: Term, fluence: Term, r: ArrayLike) -> Array:
+        r = distances(r)[..., None]
+        c_phi, c_e = (1.0 - fresnel.two_c1(self.eta)) / 4.0, (1.0 - fresnel.three_c2(self.eta)) / 2.0
+        phi = fluence(self.sigma_tr, self.z_r, self.z_v, r) / self.diffusion
+        return np.square(self.albedo) * (c_phi * phi + c_e * self._both(flux, r))

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wgsss.errors import InputError
 from wgsss.optics.gaussians import SumOfGaussians, gaussian
+from wgsss.optics.profile import Profile
 
 Array = NDArray[np.float64]
-
-
-class Profile(Protocol):
-    """What a fit needs to know of a diffusion profile."""
-
-    @property
-    def total(self) -> Array:
-        """Total diffuse reflectance (3,)."""
-        ...
-
-    def reflectance(self, r: ArrayLike) -> Array:
-        """R(r) in 1/mm^2, (..., 3), at `r` (...) in mm."""
-        ...
 
 
 # Ten decades around a millimetre, so that no profile needs to tell its scale. The integrands are smooth in log r and

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
+from wgsss.optics.profile import Profile
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,7 @@ _erf = np.vectorize(math.erf, otypes=[np.float64])
 
 
 @dataclass(frozen=True, eq=False)
-class SumOfGaussians:
+class SumOfGaussians(Profile):
     """R(r) = sum_k w_k G(v_k, r) with G(v, r) = exp(-r^2 / 2v) / (2 pi v), whose integral over the plane is 1.
 
     `variances`: (k,) in mm^2, ascending. `weights`: (k, 3), per RGB channel, dimensionless.
