@@ -94,8 +94,10 @@ def stack(layers: Sequence[Layer]) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-def coefficients(name: str, values: object, low: float, above: bool, unit: str = "") -> Array:
-    """Three finite numbers from `low`, read-only. Raises InputError, naming the channel and the value."""
+def coefficients(
+    name: str, values: object, low: float, above: bool = False, unit: str = "", high: float = math.inf
+) -> Array:
+    """Three finite numbers from `low` to `high`, read-only. Raises InputError, naming the channel and the value."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -103,8 +105,8 @@ def coefficients(name: str, values: object, low: float, above: bool, unit: str =
     if array.shape != (3,):
         raise InputError(f"{name} must be three numbers, not {values!r}")
     for channel, value in zip(CHANNELS, array.tolist(), strict=True):
-        if not (low < value if above else low <= value) or math.isinf(value):
-            bound = f"{'above' if above else 'at least'} {low:g}"
+        if not (low < value if above else low <= value) or value > high or math.isinf(value):
+            bound = f"{'above' if above else 'at least'} {low:g}" if math.isinf(high) else f"from {low:g} to {high:g}"
             raise InputError(f"{name} of {channel} must be {bound}{f' ({unit})' if unit else ''}, not {value:g}")
     array.flags.writeable = False
     return array
