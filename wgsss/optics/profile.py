@@ -36,6 +36,15 @@ class Profile(ABC):
     def reflectance(self, r: ArrayLike) -> Array:
         """R(r) in 1/mm^2, (..., 3), at distances `r` (...) in mm."""
 
+    @property
+    def total_transmittance(self) -> Array:
+        """The integral of T over the plane (3,); 0 for a medium without end."""
+        return np.zeros(3)
+
+    def transmittance(self, r: ArrayLike) -> Array:
+        """T(r) in 1/mm^2, (..., 3): what leaves on the far side of a slab at `r` (...) mm; 0 where there is none."""
+        return np.zeros((*distances(r).shape, 3))
+
     def beyond(self, r: ArrayLike) -> Array:
         """Share (..., 3) of the total that leaves farther than `r` (...) mm away, 1 to 0: epsilon of 004 eq. 40.
 
