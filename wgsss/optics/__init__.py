@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from wgsss.optics.burley import NormalizedDiffusion
 from wgsss.optics.dipole import BetterDipole, Dipole
 from wgsss.optics.fit import fit_error, fit_gaussians
 from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.medium import Layer, Medium
 from wgsss.optics.profile import Profile
+from wgsss.optics.tabulated import Tabulated
 
 __all__ = [
     "SKIN_GAUSSIANS",
@@ -15,8 +17,10 @@ __all__ = [
     "Dipole",
     "Layer",
     "Medium",
+    "NormalizedDiffusion",
     "Profile",
     "SumOfGaussians",
+    "Tabulated",
     "diffuse_fresnel",
     "fit_error",
     "fit_gaussians",
