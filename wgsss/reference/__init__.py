@@ -1,0 +1,1 @@
+"""The truths that methods and models are measured against."""
