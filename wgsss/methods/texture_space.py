@@ -17,7 +17,7 @@ from wgsss.bake.charts import charts as make_charts
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
-from wgsss.optics import SumOfGaussians, fit_gaussians
+from wgsss.optics import SumOfGaussians, fit_shared_gaussians
 from wgsss.stage import Body, Stage
 
 SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
@@ -60,12 +60,11 @@ class TextureSpace:
         return found
 
     def profile(self, body: Body) -> SumOfGaussians:
-        """The sum of Gaussians of a body's material: its own where it has at most as many, else a fit."""
-        profile = body.material.profile
-        if isinstance(profile, SumOfGaussians) and len(profile.variances) <= self.gaussians:
-            return profile
+        """The sum of Gaussians of a body's material: its own where it has at most as many, shared by the
+        channels, else a fit."""
         return body.stage.shared(
-            ("fit", id(body.material), self.gaussians), lambda: fit_gaussians(profile, self.gaussians)
+            ("fit", id(body.material), self.gaussians),
+            lambda: fit_shared_gaussians(body.material.profile, self.gaussians),
         )
 
     def passes(self, frame: Frame) -> Diffused:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wgsss.optics.burley import NormalizedDiffusion
 from wgsss.optics.dipole import BetterDipole, Dipole
-from wgsss.optics.fit import fit_error, fit_gaussians
+from wgsss.optics.fit import fit_error, fit_gaussians, fit_shared_gaussians
 from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.medium import Layer, Medium
@@ -24,4 +24,5 @@ __all__ = [
     "diffuse_fresnel",
     "fit_error",
     "fit_gaussians",
+    "fit_shared_gaussians",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
-from wgsss.optics.profile import Profile
+from wgsss.optics.profile import Profile, distances, shares
 
 Array = NDArray[np.float64]
 
@@ -20,8 +20,10 @@ _erf = np.vectorize(math.erf, otypes=[np.float64])
 class SumOfGaussians(Profile):
     """R(r) = sum_k w_k G(v_k, r) with G(v, r) = exp(-r^2 / 2v) / (2 pi v), whose integral over the plane is 1.
 
-    `variances`: (k,) in mm^2, ascending. `weights`: (k, 3), per RGB channel, dimensionless.
-    Raises InputError for anything else. Source: 004 section 3.4, 003 eq. 2.
+    `variances` in mm^2: (k,), ascending, shared by the channels, which is what blurs need; or (k, 3), a set per
+    channel, each not descending: a channel that needs fewer Gaussians may repeat its last variance with a weight of 0.
+    `weights`: (k, 3), per RGB channel, dimensionless. Raises InputError for anything else.
+    Source: 004 section 3.4, 003 eq. 2.
     """
 
     variances: Array
@@ -30,12 +32,15 @@ class SumOfGaussians(Profile):
     def __post_init__(self) -> None:
         variances = np.array(self.variances, dtype=np.float64)
         weights = np.array(self.weights, dtype=np.float64)
-        if variances.ndim != 1 or variances.size == 0 or weights.shape != (variances.size, 3):
+        shaped = weights.shape[1:] == (3,) and variances.shape in (weights.shape[:1], weights.shape)
+        if not shaped or weights.size == 0:
             raise InputError(
-                "a sum of Gaussians needs k variances and k rows of 3 weights, "
+                "a sum of Gaussians needs k variances, or k rows of 3, and k rows of 3 weights, "
                 f"not shapes {variances.shape} and {weights.shape}"
             )
-        if not (np.all(np.isfinite(variances)) and variances[0] > 0 and np.all(np.diff(variances) > 0)):
+        steps = np.diff(variances, axis=0)
+        ascending = np.all(steps > 0 if variances.ndim == 1 else steps >= 0)
+        if not (np.all(np.isfinite(variances)) and np.all(variances > 0) and ascending):
             raise InputError(f"variances must be positive and ascending (mm^2), not {variances.tolist()}")
         if not (np.all(np.isfinite(weights)) and np.all(weights >= 0)):
             raise InputError(f"weights must be finite and not negative, not {weights.tolist()}")
@@ -49,13 +54,26 @@ class SumOfGaussians(Profile):
         return self.weights.sum(axis=0)
 
     def reflectance(self, r: ArrayLike) -> Array:
-        """R(r) in 1/mm^2, shape (..., 3), at distances `r` (...) in mm."""
-        return gaussian(self.variances, np.asarray(r, dtype=np.float64)[..., None]) @ self.weights
+        return self._weighted(gaussian(self.variances, self._each(distances(r))))
+
+    def beyond(self, r: ArrayLike) -> Array:
+        return shares(self._weighted(np.exp(-np.square(self._each(distances(r))) / (2.0 * self.variances))), self.total)
+
+    def line_spread(self, x: ArrayLike) -> Array:
+        along = np.exp(-np.square(self._each(x)) / (2.0 * self.variances)) / np.sqrt(2.0 * np.pi * self.variances)
+        return self._weighted(along)
 
     def step_response(self, x: ArrayLike) -> Array:
         """Radiosity (..., 3) at `x` (...) mm from a straight edge, where the side x > 0 receives unit irradiance."""
-        t = np.asarray(x, dtype=np.float64)[..., None] / np.sqrt(2.0 * self.variances)
-        return 0.5 * (1.0 + _erf(t)) @ self.weights
+        return self._weighted(0.5 * (1.0 + _erf(self._each(x) / np.sqrt(2.0 * self.variances))))
+
+    def _each(self, r: ArrayLike) -> Array:
+        """`r` (...) with the axes of the variances appended."""
+        return np.asarray(r, dtype=np.float64)[..., *(None,) * self.variances.ndim]
+
+    def _weighted(self, terms: Array) -> Array:
+        """The weighted sum (..., 3) of one term per Gaussian, (..., k) or (..., k, 3)."""
+        return terms @ self.weights if self.variances.ndim == 1 else (terms * self.weights).sum(axis=-2)
 
 
 def gaussian(variance: ArrayLike, r: ArrayLike) -> Array:
