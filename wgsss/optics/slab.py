@@ -1,0 +1,76 @@
+"""Fourier transforms of what a slab reflects and lets through, in closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wgsss.errors import InputError
+from wgsss.optics import fresnel
+from wgsss.optics.medium import CHANNELS, Medium
+
+Array = NDArray[np.float64]
+Spectrum = NDArray[Any]  # floats at real frequencies, complex numbers at complex ones
+
+
+class SlabSpectra(NamedTuple):
+    """Fourier transforms (..., 3) of a slab's R and T, lit from above (R+, T+ in 004) and from below (R-, T-).
+
+    T differs between the two wherever the boundaries do: the source is a mean free path below the lit face.
+    """
+
+    R_above: Spectrum
+    T_down: Spectrum
+    R_below: Spectrum
+    T_up: Spectrum
+
+
+def slab_spectra(medium: Medium, thickness: float, above: float, below: float, k: ArrayLike) -> SlabSpectra:
+    """The transforms of a finite slab between media of indices `above` and `below`, at `k` (...) in 1/mm.
+
+    R = alpha' cosh(q z0) sinh(q (s + zs - l)) / sinh(q H) and T = alpha' cosh(q zs) sinh(q (l + z0)) / sinh(q H) from
+    above, with q^2 = sigma_tr^2 + k^2, s the thickness, l the mean free path, z0 and zs as of `extrapolation` and
+    H = s + z0 + zs: the geometric series of the images. Written in exponentials that fall.
+    """
+    q = decay(medium, k)
+    z0, zs = extrapolation(medium, above, below)
+    s, mfp = thickness, medium.mean_free_path
+    norm = 0.5 * medium.albedo / np.expm1(-2.0 * q * (s + z0 + zs))
+    reflected, passed = norm * np.exp(-q * mfp), norm * np.exp(-q * (s - mfp))
+    mirrored_above, mirrored_below = 1.0 + np.exp(-2.0 * q * z0), 1.0 + np.exp(-2.0 * q * zs)
+    return SlabSpectra(
+        reflected * mirrored_above * np.expm1(-2.0 * q * (s + zs - mfp)),
+        passed * mirrored_below * np.expm1(-2.0 * q * (mfp + z0)),
+        reflected * mirrored_below * np.expm1(-2.0 * q * (s + z0 - mfp)),
+        passed * mirrored_above * np.expm1(-2.0 * q * (mfp + zs)),
+    )
+
+
+def decay(medium: Medium, k: ArrayLike) -> Spectrum:
+    """q (..., 3) in 1/mm: how light of angular frequency `k` (...) falls off with depth, real part not negative."""
+    q = np.sqrt(np.square(medium.sigma_tr) + np.square(np.asarray(k))[..., None])
+    return np.where(q == 0.0, 1e-150, q)  # the limit of ratios of sinh
+
+
+def extrapolation(medium: Medium, above: float, below: float) -> tuple[Array, Array]:
+    """Distances 2 A D (3,) in mm beyond a slab's two faces at which its fluence is 0, from its neighbours' indices."""
+    z0, zs = (2.0 * fresnel.boundary(medium.eta / eta) * medium.diffusion for eta in (above, below))
+    return z0, zs
+
+
+def check_thickness(medium: Medium, thickness: float, name: str) -> None:
+    """Raises InputError unless a slab is thicker than its mean free path in every channel."""
+    for channel, length in zip(CHANNELS, medium.mean_free_path, strict=True):
+        if not thickness > length:
+            raise InputError(
+                f"{name} must be above the mean free path of {channel}, {length:.4g} mm, not {thickness:g}"
+            )
+
+
+def check_below(eta: float) -> None:
+    """Raises InputError unless the index of what lies below is a number of at least 1."""
+    if not (isinstance(eta, int | float | np.number) and 1.0 <= eta < math.inf):
+        raise InputError(f"eta_below must be a number of at least 1, not {eta}")
