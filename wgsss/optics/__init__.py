@@ -7,20 +7,26 @@ from wgsss.optics.dipole import BetterDipole, Dipole
 from wgsss.optics.fit import fit_error, fit_gaussians, fit_shared_gaussians
 from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
+from wgsss.optics.layers import Layers
 from wgsss.optics.medium import Layer, Medium
+from wgsss.optics.multipole import Multipole
 from wgsss.optics.profile import Profile
 from wgsss.optics.tabulated import Tabulated
+from wgsss.optics.thin import blend
 
 __all__ = [
     "SKIN_GAUSSIANS",
     "BetterDipole",
     "Dipole",
     "Layer",
+    "Layers",
     "Medium",
+    "Multipole",
     "NormalizedDiffusion",
     "Profile",
     "SumOfGaussians",
     "Tabulated",
+    "blend",
     "diffuse_fresnel",
     "fit_error",
     "fit_gaussians",
