@@ -3,10 +3,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import nnls
+from scipy.optimize import least_squares, nnls
 
 from wgsss.errors import InputError
-from wgsss.optics import SKIN_GAUSSIANS, Dipole, SumOfGaussians, fit_error, fit_shared_gaussians
+from wgsss.optics import (
+    SKIN_GAUSSIANS,
+    Dipole,
+    NormalizedDiffusion,
+    SumOfGaussians,
+    Tabulated,
+    fit_error,
+    fit_gaussians,
+    fit_shared_gaussians,
+)
+from wgsss.scene import MATERIALS
+
+MEASURED = {name: material.profile for name, material in MATERIALS.items() if material.gaussians is None}
+FITS = pytest.mark.parametrize("fit", [fit_gaussians, fit_shared_gaussians])
 
 
 class Opaque:
@@ -16,7 +29,7 @@ class Opaque:
         self.total, self.reflectance = profile.total, profile.reflectance
 
 
-def test_six_gaussians_fit_each_measured_material_within_a_percent(measured):
+def test_six_shared_gaussians_fit_each_measured_material_within_a_percent(measured):
     profile = measured.dipole
     fit = fit_shared_gaussians(profile)
     assert fit.variances.size == 6
@@ -24,10 +37,9 @@ def test_six_gaussians_fit_each_measured_material_within_a_percent(measured):
     np.testing.assert_allclose(fit.total, profile.total, rtol=1e-12)
 
 
-def test_error_falls_with_the_number_of_gaussians(measured):
-    errors = [
-        np.linalg.norm(fit_error(measured.dipole, fit_shared_gaussians(measured.dipole, k))) for k in (1, 2, 3, 4, 6, 8)
-    ]
+@FITS
+def test_error_falls_with_the_number_of_gaussians(measured, fit):
+    errors = [np.linalg.norm(fit_error(measured.dipole, fit(measured.dipole, k))) for k in (1, 2, 3, 4, 6, 8)]
     assert np.all(np.diff(errors) < 0)
 
 
@@ -75,33 +87,147 @@ def test_a_sum_of_gaussians_is_found_again():
     np.testing.assert_allclose(fit.weights, two.weights, atol=1e-6)
 
 
-def test_same_bits_each_time(skin):
-    first, second = fit_shared_gaussians(skin), fit_shared_gaussians(skin)
+@FITS
+def test_same_bits_each_time(skin, fit):
+    first, second = fit(skin), fit(skin)
     assert first.variances.tobytes() == second.variances.tobytes()
     assert first.weights.tobytes() == second.weights.tobytes()
 
 
-def test_halving_lengths_quarters_variances(skin):
-    fit = fit_shared_gaussians(skin)
-    half = fit_shared_gaussians(Dipole(2 * skin.sigma_a, 2 * skin.sigma_s_prime, skin.eta))
-    np.testing.assert_allclose(half.variances, fit.variances / 4, rtol=1e-3)
+@FITS
+@pytest.mark.parametrize("factor", [0.5, 1e-6, 1e7])
+def test_scaling_lengths_scales_variances(skin, fit, factor):
+    found = fit(skin)
+    scaled = fit(Dipole(skin.sigma_a / factor, skin.sigma_s_prime / factor, skin.eta))
+    np.testing.assert_allclose(scaled.variances, found.variances * factor**2, rtol=1e-3)
+    np.testing.assert_allclose(scaled.weights, found.weights, atol=1e-3)
 
 
-def test_permuting_channels_permutes_weights(skin):
+@FITS
+@pytest.mark.parametrize("factor", [1e-20, 7.0])
+def test_scaling_the_light_scales_weights(skin, fit, factor):
+    bright = Opaque(skin)
+    bright.total, bright.reflectance = factor * skin.total, lambda r: factor * skin.reflectance(r)
+    np.testing.assert_allclose(fit(bright).weights, factor * fit(skin).weights, rtol=1e-3, atol=1e-6 * factor)
+
+
+def test_permuting_channels_permutes_shared_weights(skin):
     fit = fit_shared_gaussians(skin)
     turned = fit_shared_gaussians(Dipole(skin.sigma_a[[2, 0, 1]], skin.sigma_s_prime[[2, 0, 1]], skin.eta))
     np.testing.assert_allclose(turned.variances, fit.variances, rtol=1e-6)
     np.testing.assert_allclose(turned.weights, fit.weights[:, [2, 0, 1]], atol=1e-6)
 
 
-def test_black_channels_stay_black():
+@FITS
+def test_black_channels_stay_black(fit):
     two = SumOfGaussians([0.2, 3.0], [[0.5, 0.0, 0.1], [0.1, 0.0, 0.3]])
-    half_black = fit_shared_gaussians(Opaque(two), 3)
+    half_black = fit(Opaque(two), 3)
     assert np.all(half_black.weights[:, 1] == 0.0)
     assert np.all(half_black.total[[0, 2]] > 0.0)
-    assert np.all(fit_shared_gaussians(Opaque(SumOfGaussians([1.0], np.zeros((1, 3))))).total == 0.0)
+    assert np.all(fit(Opaque(SumOfGaussians([1.0], np.zeros((1, 3))))).total == 0.0)
 
 
-def test_no_gaussians_is_told(skin):
+@FITS
+def test_no_gaussians_is_told(skin, fit):
     with pytest.raises(InputError, match="at least one"):
-        fit_shared_gaussians(skin, 0)
+        fit(skin, 0)
+
+
+# Each channel by itself, its energy left free.
+
+
+@pytest.mark.parametrize(("k", "percent"), [(2, 9.9), (3, 3.7), (4, 1.53), (6, 0.33)])
+def test_worst_error_of_the_measured_materials(k, percent):
+    worst = max(fit_error(profile, profile.gaussians(k)).max() for profile in MEASURED.values())
+    assert 0.9 * percent < 100 * worst <= percent
+
+
+def test_errors_of_four_gaussians_are_the_published_ones():
+    """003 below eq. 2: between 1.52 and 0.0793 percent. Only two channels of ketchup, nearly black, fall below."""
+    errors = {name: 100 * fit_error(profile, fit_gaussians(profile, 4)) for name, profile in MEASURED.items()}
+    np.testing.assert_allclose(errors["spectralon"], 1.5225, atol=5e-5)
+    assert errors["chicken2"][2] == pytest.approx(0.0794, abs=5e-5)
+    np.testing.assert_allclose(errors["ketchup"][1:], [0.0324, 0.0307], atol=5e-5)
+    others = [e for name, errors_of in errors.items() for e in errors_of[: 1 if name == "ketchup" else 3]]
+    assert max(others) < 1.5226 and min(others) > 0.0793
+
+
+def test_light_that_four_gaussians_lose():
+    """As far as eq. 2 cares, a white medium's tail may go."""
+    white = MEASURED["spectralon"]
+    np.testing.assert_allclose(fit_gaussians(white, 4).total, 1 - 0.1242, atol=1e-3)
+
+
+@pytest.mark.parametrize("k", [1, 3, 6])
+def test_no_other_start_ends_lower(skin, k):
+    """Variances by scipy's least squares from random starts, with the weights by Lawson and Hanson at each step."""
+    r = np.geomspace(1e-4, 1e3, 250)
+    root = r * np.sqrt(np.log(r[1] / r[0]))
+    wanted = root * skin.reflectance(r)[:, 0]
+    wanted /= np.linalg.norm(wanted)
+
+    def residual(log_variance):
+        v = np.exp(log_variance)
+        columns = root[:, None] * np.exp(-np.square(r)[:, None] / (2 * v)) / v
+        columns /= np.linalg.norm(columns, axis=0)
+        return columns @ nnls(columns, wanted)[0] - wanted
+
+    rng = np.random.default_rng(k)
+    starts = [np.sort(rng.uniform(-4, 4, k)) for _ in range(3)]
+    best = min(least_squares(residual, x, bounds=(-15, 15), xtol=1e-10).cost for x in starts)
+    assert fit_error(skin, fit_gaussians(skin, k))[0] == pytest.approx(np.sqrt(2 * best), rel=1e-4)
+
+
+def test_channels_are_fitted_alone(skin):
+    fit = fit_gaussians(skin, 4)
+    turned = fit_gaussians(Dipole(skin.sigma_a[[2, 0, 1]], skin.sigma_s_prime[[2, 0, 1]], skin.eta), 4)
+    np.testing.assert_array_equal(turned.variances, fit.variances[:, [2, 0, 1]])
+    np.testing.assert_array_equal(turned.weights, fit.weights[:, [2, 0, 1]])
+
+
+def test_a_sum_of_gaussians_is_found_again_in_each_channel():
+    shared = fit_gaussians(SKIN_GAUSSIANS)
+    np.testing.assert_array_equal(shared.variances, np.repeat(SKIN_GAUSSIANS.variances[:, None], 3, axis=1))
+    np.testing.assert_array_equal(shared.weights, SKIN_GAUSSIANS.weights)
+    two = SumOfGaussians([[0.2, 0.1, 1.0], [3.0, 4.0, 5.0]], [[0.5, 0.2, 0.7], [0.1, 0.2, 0.3]])
+    assert fit_gaussians(two, 2).variances.tolist() == two.variances.tolist()
+    fit = fit_gaussians(Opaque(two), 2)
+    np.testing.assert_allclose(fit.variances, two.variances, rtol=1e-6)
+    np.testing.assert_allclose(fit.weights, two.weights, atol=1e-6)
+
+
+def test_blurs_get_shared_variances_of_any_sum():
+    own = SumOfGaussians([[0.2, 0.1, 1.0], [3.0, 4.0, 5.0]], [[0.5, 0.2, 0.7], [0.1, 0.2, 0.3]])
+    fit = fit_shared_gaussians(own)
+    assert fit.variances.ndim == 1
+    np.testing.assert_allclose(fit.total, own.total, rtol=1e-12)
+    assert np.all(fit_error(own, fit) < 0.02)
+
+
+def test_channels_may_need_different_numbers_of_gaussians():
+    """Where one is enough for a channel, its others weigh nothing."""
+    three = SumOfGaussians([0.01, 1.0, 100.0], [[0.3, 0.0, 0.0], [0.3, 0.5, 0.0], [0.3, 0.0, 0.5]])
+    fit = fit_gaussians(Opaque(three), 3)
+    assert np.all(fit_error(three, fit) < 1e-6)
+    np.testing.assert_allclose(fit.total, three.total, rtol=1e-6)
+
+
+def test_a_profile_without_end_at_zero_gets_gaussians_one_can_see():
+    """Level, at R of that distance, where Burley's has let out a hundredth of its light: at 0.02 d."""
+    burley = NormalizedDiffusion((0.9, 0.4, 0.1), (2.0, 0.5, 1e-4))
+    fit = fit_gaussians(burley)
+    assert np.all(fit_error(burley, fit) < 0.04)
+    assert np.all(np.abs(fit.total / burley.total - 1) < 0.06)
+    assert np.all(np.sqrt(fit.variances[0]) > 0.005 * burley.d)
+    np.testing.assert_allclose(fit.reflectance(burley.d).diagonal(), burley.reflectance(burley.d).diagonal(), rtol=0.1)
+
+
+@FITS
+def test_a_noisy_histogram_is_fitted_to_its_noise(skin, fit):
+    """Photons in bins, most of them empty far out."""
+    edges = np.linspace(0, 20, 401)
+    share = skin.beyond(edges[:-1]) - skin.beyond(edges[1:])
+    area = np.pi * np.diff(np.square(edges))
+    photons = np.random.default_rng(1).poisson(3e5 * share)
+    table = Tabulated((edges[:-1] + edges[1:]) / 2, photons / 3e5 / area[:, None] * skin.total)
+    assert np.all(fit_error(skin, fit(table)) < 0.05)

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 _R = np.geomspace(1e-5, 1e5, 400)
 _MEASURE = (np.square(_R) * np.log(_R[1] / _R[0]))[:, None]  # r dr
 
-# The first guess spreads the Gaussians between the radii that hold these shares of the light. Any start near it finds
-# the same optimum (tried for the twelve measured materials).
+# The first guess spreads the Gaussians between the radii that hold these shares of the light. For the twelve measured
+# materials no random start was found to end lower.
 _START = (0.05, 0.97)
 
 # Where R is infinite at r = 0, so is the integral of eq. 2, and the best Gaussian would be a needle that nobody sees.
@@ -26,9 +26,18 @@ _CORE = 0.01
 
 
 def fit_gaussians(profile: Profile, k: int = 6) -> SumOfGaussians:
-    """The sum of at most `k` Gaussians nearest to `profile` in each channel, with variances (k, 3) of their own.
+    """The sum of at most `k` Gaussians nearest to `profile` in each channel, with variances (k, 3) of its own.
 
-    Minimises the r-weighted squared error of 003 eq. 2, with weights >= 0 and the energy left free.
+    Minimises the r-weighted squared error of 003 eq. 2, with weights >= 0 and the energy left free: most of what eq. 2
+    does not see, the tail, is lost. Over the twelve materials of Jensen et al. 2001, in percent, at worst:
+
+        k             1     2     3     4     5     6
+        fit_error    29.1   9.84  3.69  1.52  0.68  0.32
+        light lost   61    33    20    12     8.2   5.5
+
+    To keep the light, scale the weights by profile.total / fit.total, or take `fit_shared_gaussians`. A sum of no more
+    than `k` Gaussians is its own fit. Where R is infinite at r = 0, it is fitted as if it were level within the radius
+    that holds a hundredth of its light. Deterministic. Raises InputError for k < 1.
     """
     _check(k)
     if isinstance(profile, SumOfGaussians) and len(profile.variances) <= k:
@@ -73,7 +82,7 @@ def fit_error(profile: Profile, fit: SumOfGaussians) -> Array:
     """Relative error (3,) of a fit: the root of int r (R - S)^2 dr over int r R^2 dr; 0 for a black channel.
 
     In percent this is the error that 003 quotes below its eq. 2. A profile that is infinite at r = 0 counts as level
-    within the radius that holds a hundredth of its light.
+    near there, as in `fit_gaussians`.
     """
     unit = _scale(profile)
     wanted = _sampled(profile, unit)
