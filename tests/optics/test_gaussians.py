@@ -5,7 +5,13 @@ import pytest
 from scipy.integrate import quad
 
 from wgsss.errors import InputError
-from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
+from wgsss.optics import SKIN_GAUSSIANS, Profile, SumOfGaussians
+
+OWN = SumOfGaussians(
+    [[0.01, 0.2, 0.3], [1.0, 0.2, 5.0]],  # green needs but one
+    [[0.2, 0.5, 0.0], [0.3, 0.0, 0.4]],
+)
+EACH = pytest.mark.parametrize("profile", [SKIN_GAUSSIANS, OWN], ids=["shared", "own"])
 
 
 def test_skin_is_table_4_of_deon_and_luebke():
@@ -29,6 +35,43 @@ def test_total_is_the_integral_over_the_plane():
         assert total == pytest.approx(1.0, abs=1e-9)
 
 
+def test_own_variances_are_a_sum_of_each_channel():
+    r, x = np.array([[0.0, 0.1], [1.0, 5.0]]), np.array([-2.0, 0.0, 0.3])
+    for c in range(3):
+        alone = SumOfGaussians(OWN.variances[:, c] * [1, 1 + 1e-15], np.repeat(OWN.weights[:, [c]], 3, axis=1))
+        for name, at in (("reflectance", r), ("beyond", r), ("line_spread", x), ("step_response", x)):
+            found = getattr(OWN, name)(at)
+            assert found.shape == (*at.shape, 3)
+            np.testing.assert_allclose(found[..., c], getattr(alone, name)(at)[..., c], rtol=1e-13)
+    np.testing.assert_array_equal(OWN.total, [0.5, 0.5, 0.4])
+
+
+@EACH
+def test_closed_forms_are_the_integrals_of_reflectance(profile):
+    r = np.array([0.0, 1e-3, 0.1, 1.0, 5.0])
+    np.testing.assert_allclose(profile.beyond(r), Profile.beyond(profile, r), atol=2e-8)
+    np.testing.assert_allclose(profile.line_spread(-r), Profile.line_spread(profile, r), rtol=5e-8, atol=1e-20)
+    np.testing.assert_allclose(profile.beyond(profile.range(0.02)).diagonal(), 0.02, rtol=1e-10)
+
+
+@EACH
+def test_line_spread_is_the_slope_of_the_step_response(profile):
+    x = np.array([0.0, 0.05, 0.4, 2.0])
+    slope = (profile.step_response(x + 1e-6) - profile.step_response(x - 1e-6)) / 2e-6
+    np.testing.assert_allclose(profile.line_spread(x), slope, rtol=1e-6, atol=1e-9)
+
+
+@EACH
+def test_channels_are_independent(profile):
+    turned = SumOfGaussians(
+        profile.variances[..., [2, 0, 1]] if profile is OWN else profile.variances, profile.weights[:, [2, 0, 1]]
+    )
+    r = np.geomspace(1e-3, 10, 57)
+    for name in ("reflectance", "beyond", "line_spread", "step_response"):
+        np.testing.assert_array_equal(getattr(turned, name)(r), getattr(profile, name)(r)[:, [2, 0, 1]])
+    np.testing.assert_array_equal(turned.range(), profile.range()[[2, 0, 1]])
+
+
 def test_step_response_is_the_convolution_with_a_half_plane():
     """A ring of radius r about x lies within the lit side by a share arccos(-x / r) / pi."""
     for x in (-2.0, -0.3, -0.02, 0.0, 0.1, 1.5):
@@ -41,11 +84,18 @@ def test_step_response_is_the_convolution_with_a_half_plane():
             assert SKIN_GAUSSIANS.step_response(x)[channel] == pytest.approx(response, abs=1e-8)
 
 
-def test_halving_lengths_scales_reflectance_by_four():
-    half = SumOfGaussians(SKIN_GAUSSIANS.variances / 4, SKIN_GAUSSIANS.weights)
+@EACH
+def test_halving_lengths_scales_reflectance_by_four(profile):
+    half = SumOfGaussians(profile.variances / 4, profile.weights)
     r = np.array([[0.0, 0.1], [1.0, 5.0]])
     assert half.reflectance(r).shape == (2, 2, 3)
-    np.testing.assert_allclose(half.reflectance(r / 2), 4 * SKIN_GAUSSIANS.reflectance(r), rtol=1e-12)
+    np.testing.assert_allclose(half.reflectance(r / 2), 4 * profile.reflectance(r), rtol=1e-12)
+
+
+def test_bad_distances_are_told():
+    for name in ("reflectance", "beyond"):
+        with pytest.raises(InputError, match="distances must be at least 0"):
+            getattr(OWN, name)(-1.0)
 
 
 @pytest.mark.parametrize(
@@ -54,6 +104,12 @@ def test_halving_lengths_scales_reflectance_by_four():
         ([], np.zeros((0, 3)), "k variances"),
         ([1.0], [[1.0, 1.0]], "k variances"),
         ([1.0, 1.0], np.ones((2, 3)), "ascending"),
+        (1.0, np.ones((1, 3)), "k variances"),
+        (1.0, 1.0, "k variances"),
+        (np.ones((2, 2)), np.ones((2, 3)), "k rows of 3"),
+        (np.ones((3, 3)), np.ones((2, 3)), "k rows of 3"),
+        ([[1.0, 1.0, 2.0], [1.0, 1.0, 1.0]], np.ones((2, 3)), "ascending"),
+        ([[1.0, 1.0, 0.0]], np.ones((1, 3)), "positive"),
         ([0.0, 1.0], np.ones((2, 3)), "positive"),
         ([np.nan], np.ones((1, 3)), "positive"),
         ([1.0], [[1.0, -0.1, 1.0]], "not negative"),

@@ -41,8 +41,8 @@ def fit_gaussians(profile: Profile, k: int = 6) -> SumOfGaussians:
     """
     _check(k)
     if isinstance(profile, SumOfGaussians) and len(profile.variances) <= k:
-        variances = profile.variances.reshape(len(profile.variances), -1)
-        return SumOfGaussians(np.broadcast_to(variances, profile.weights.shape), profile.weights)
+        variances = np.broadcast_to(profile.variances.T, profile.weights.shape[::-1]).T
+        return SumOfGaussians(variances, profile.weights)
     unit = _scale(profile)
     R = _sampled(profile, unit)
     variances, weights = np.ones((k, 3)), np.zeros((k, 3))

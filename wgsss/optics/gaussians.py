@@ -54,26 +54,31 @@ class SumOfGaussians(Profile):
         return self.weights.sum(axis=0)
 
     def reflectance(self, r: ArrayLike) -> Array:
-        return self._weighted(gaussian(self.variances, self._each(distances(r))))
+        return self._sum(gaussian(self._v, _each(distances(r))))
 
     def beyond(self, r: ArrayLike) -> Array:
-        return shares(self._weighted(np.exp(-np.square(self._each(distances(r))) / (2.0 * self.variances))), self.total)
+        return shares(self._sum(np.exp(-np.square(_each(distances(r))) / (2.0 * self._v))), self.total)
 
     def line_spread(self, x: ArrayLike) -> Array:
-        along = np.exp(-np.square(self._each(x)) / (2.0 * self.variances)) / np.sqrt(2.0 * np.pi * self.variances)
-        return self._weighted(along)
+        return self._sum(np.exp(-np.square(_each(x)) / (2.0 * self._v)) / np.sqrt(2.0 * np.pi * self._v))
 
     def step_response(self, x: ArrayLike) -> Array:
         """Radiosity (..., 3) at `x` (...) mm from a straight edge, where the side x > 0 receives unit irradiance."""
-        return self._weighted(0.5 * (1.0 + _erf(self._each(x) / np.sqrt(2.0 * self.variances))))
+        return self._sum(0.5 * (1.0 + _erf(_each(x) / np.sqrt(2.0 * self._v))))
 
-    def _each(self, r: ArrayLike) -> Array:
-        """`r` (...) with the axes of the variances appended."""
-        return np.asarray(r, dtype=np.float64)[..., *(None,) * self.variances.ndim]
+    @property
+    def _v(self) -> Array:
+        """The variances (k, 1) or (k, 3)."""
+        return self.variances.reshape(len(self.variances), -1)
 
-    def _weighted(self, terms: Array) -> Array:
-        """The weighted sum (..., 3) of one term per Gaussian, (..., k) or (..., k, 3)."""
-        return terms @ self.weights if self.variances.ndim == 1 else (terms * self.weights).sum(axis=-2)
+    def _sum(self, terms: Array) -> Array:
+        """The weighted sum (..., 3) of the Gaussians' terms (..., k, 1 or 3)."""
+        return (terms * self.weights).sum(axis=-2)
+
+
+def _each(r: ArrayLike) -> Array:
+    """`r` (...) with axes for Gaussians and channels."""
+    return np.asarray(r, dtype=np.float64)[..., None, None]
 
 
 def gaussian(variance: ArrayLike, r: ArrayLike) -> Array:
