@@ -59,6 +59,12 @@ class Medium:
         """Effective transport coefficient (3,) in 1/mm; 0 where nothing absorbs, and R then falls as 1/r^3."""
         return np.sqrt(self.sigma_a / self.diffusion)
 
+    @property
+    def diffuse_mean_free_path(self) -> Array:
+        """1 / sigma_tr (3,) in mm; infinite where nothing absorbs."""
+        with np.errstate(divide="ignore"):
+            return 1.0 / self.sigma_tr
+
 
 @dataclass(frozen=True, eq=False)
 class Layer(Medium):
