@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,21 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wgsss import wgsl
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.optics.medium import Layer, stack
 from wgsss.optics.profile import Profile, distances, shares
-from wgsss.wgsl import load
 
 Array = NDArray[np.float64]
 
 _MODULE = "reference/photons"
 _NEAREST = 1 / 256  # the least radius told apart, of the shortest mean free path
 _ENDLESS = 1e20  # mm; still finite in float32 once divided by the flattest direction's cosine
-_BATCH = 1024  # photons; as many as the tallies can hold
-_BATCHES = 64  # at least, where there are so many photons, for an error to be told from them
-_SUBMISSION_S = 0.25  # what a submission may take, so that a desktop on the same device stays alive
+_BATCH = 1024  # photons at most, so that tallies do not overflow
+_BATCHES = 64  # at least, where there are so many photons, for an error to be told from their spread
+_ROUND = 8192  # batches tallied before they are read: 24 MiB
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,40 +33,30 @@ class Photons(Profile):
     """What became of photons that entered a stack of layers at one point, at a right angle.
 
     Everything but `specular` is per unit of flux that entered, as diffusion has it, and per RGB channel. Errors are
-    standard errors, from the spread over batches; infinite for a single photon.
+    standard errors, from the spread over batches of photons; infinite for a single photon.
 
-    `edges`: radii (n + 1,) in mm of rings about the point, from 0; the last ring, beyond the last edge, has no end.
-    `reflected`, `transmitted`: share (n + 1, 3) that left through each ring on the side of entry, and on the far side.
-    `reflected_error`, `transmitted_error`: their errors (n + 1, 3).
-    `total_error`, `total_transmittance_error`: errors (3,) of the totals.
+    `edges`: radii (n + 1,) in mm of the rings about the point that light is counted in, from 0.
+    `R`, `T`: mean exitance (n, 3) of each ring in 1/mm^2, on the side of entry and on the far side.
+    `R_error`, `T_error`: their errors (n, 3).
+    `R_outside`, `T_outside`: shares (3,) that left beyond the last ring.
+    `total_error`, `total_transmittance_error`: errors (3,) of `total` and `total_transmittance`.
     `absorbed`: share (3,) that stayed inside.
     `specular`: share of the incident light that the top reflects without letting it in.
     `photons`: how many were followed in each channel.
     """
 
     edges: Array
-    reflected: Array
-    reflected_error: Array
-    transmitted: Array
-    transmitted_error: Array
+    R: Array
+    R_error: Array
+    T: Array
+    T_error: Array
+    R_outside: Array
+    T_outside: Array
     total_error: Array
     total_transmittance_error: Array
     absorbed: Array
     specular: float
     photons: int
-
-    @property
-    def total(self) -> Array:
-        return self.reflected.sum(axis=0)
-
-    @property
-    def total_transmittance(self) -> Array:
-        return self.transmitted.sum(axis=0)
-
-    @property
-    def balance(self) -> Array:
-        """Reflected, transmitted and absorbed (3,) together: 1, but for the roulette that ends faint photons."""
-        return self.total + self.total_transmittance + self.absorbed
 
     @cached_property
     def areas(self) -> Array:
@@ -75,63 +64,56 @@ class Photons(Profile):
         return np.pi * np.diff(np.square(self.edges))[:, None]
 
     @property
-    def R(self) -> Array:
-        """Mean of R (n, 3) over each ring, 1/mm^2."""
-        return self.reflected[:-1] / self.areas
+    def total(self) -> Array:
+        return (self.R * self.areas).sum(axis=0) + self.R_outside
 
     @property
-    def R_error(self) -> Array:
-        """Standard error (n, 3) of `R`."""
-        return self.reflected_error[:-1] / self.areas
+    def total_transmittance(self) -> Array:
+        return (self.T * self.areas).sum(axis=0) + self.T_outside
 
     @property
-    def T(self) -> Array:
-        """Mean of T (n, 3) over each ring, 1/mm^2."""
-        return self.transmitted[:-1] / self.areas
-
-    @property
-    def T_error(self) -> Array:
-        """Standard error (n, 3) of `T`."""
-        return self.transmitted_error[:-1] / self.areas
+    def balance(self) -> Array:
+        """Reflected, transmitted and absorbed (3,) together: 1, but for the roulette that ends faint photons."""
+        return self.total + self.total_transmittance + self.absorbed
 
     def reflectance(self, r: ArrayLike) -> Array:
         """R(r) in 1/mm^2, (..., 3), at `r` (...) mm: linear in log r between the rings' means.
 
-        Beyond the last edge what is left is taken to fall as 1/r^3, as it does where nothing absorbs.
+        What left beyond the last ring is taken to fall as 1/r^3, as it does where nothing absorbs.
         """
-        return self._between(self.reflected, r)
+        return self._between(self.R, self.R_outside, r)
 
     def transmittance(self, r: ArrayLike) -> Array:
         """T(r) in 1/mm^2, (..., 3), as `reflectance`."""
-        return self._between(self.transmitted, r)
+        return self._between(self.T, self.T_outside, r)
 
-    def _between(self, parts: Array, r: ArrayLike) -> Array:
+    def _between(self, means: Array, outside: Array, r: ArrayLike) -> Array:
         r = distances(r)
-        means = parts[:-1] / self.areas
-        middle = np.log(np.sqrt(0.5 * (np.square(self.edges[1:]) + np.square(self.edges[:-1]))))
-        x = np.log(np.clip(r, 0.1 * self.edges[1], None))
-        inside = np.stack([np.interp(x, middle, means[:, c]) for c in range(3)], axis=-1)
+        squares = np.square(self.edges)
+        middle = 0.5 * np.log(0.5 * (squares[1:] + squares[:-1]))
+        log_r = np.log(np.maximum(r, 0.1 * self.edges[1]))
+        near = np.stack([np.interp(log_r, middle, means[:, c]) for c in range(3)], axis=-1)
         last = self.edges[-1]
-        outside = parts[-1] * last / (2.0 * np.pi * np.maximum(r, last)[..., None] ** 3)
-        return np.where(r[..., None] < last, inside, outside)
+        far = outside * last / (2.0 * np.pi * np.maximum(r, last)[..., None] ** 3)
+        return np.where(r[..., None] < last, near, far)
 
     def beyond(self, r: ArrayLike) -> Array:
         """Share (..., 3) of the total that leaves farther than `r` (...) mm away: exact at edges, even within rings."""
         r = distances(r)
-        outside = np.cumsum(self.reflected[::-1], axis=0)[::-1]  # beyond each edge
-        area = np.square(self.edges)
-        found = np.stack([np.interp(np.square(r), area, outside[:, c]) for c in range(3)], axis=-1)
-        return shares(found * (self.edges[-1] / np.maximum(r, self.edges[-1]))[..., None], self.total)
+        rings = np.vstack([self.R * self.areas, self.R_outside])
+        beyond_edge = np.cumsum(rings[::-1], axis=0)[::-1]
+        squares = np.square(self.edges)
+        found = np.stack([np.interp(np.square(r), squares, beyond_edge[:, c]) for c in range(3)], axis=-1)
+        found *= (self.edges[-1] / np.maximum(r, self.edges[-1]))[..., None]
+        return shares(found, self.total)
 
     def line_spread(self, x: ArrayLike) -> Array:
         """R integrated along a line at |x| (...) mm: (..., 3) in 1/mm, exact for the rings by their chords."""
         x = distances(np.abs(np.asarray(x, dtype=np.float64)))[..., None]
         half = np.sqrt(np.maximum(np.square(self.edges) - np.square(x), 0.0))
         last = self.edges[-1]
-        # The last ring: 1/r^3 integrated along what of the line lies outside of the last edge.
-        outside = 1.0 / (np.pi * last * (1.0 + half[..., -1:] / last))
-        outside *= np.square(last / np.maximum(x, last))
-        return 2.0 * np.diff(half, axis=-1) @ self.R + outside * self.reflected[-1]
+        far = np.square(last / np.maximum(x, last)) / (np.pi * (last + half[..., -1:]))  # the integral of 1/r^3
+        return 2.0 * np.diff(half, axis=-1) @ self.R + far * self.R_outside
 
 
 def trace(
@@ -145,8 +127,8 @@ def trace(
 ) -> Photons:
     """Follow photons through a stack of layers, from the top down: the method of Wang, Jacques and Zheng 1995 (MCML).
 
-    Equal arguments give equal bits on one adapter. Light that is still inside after 262,144 flights counts as absorbed:
-    some of it in a half space that absorbs nothing, next to none elsewhere.
+    Equal arguments give equal bits on one adapter. Light that is still inside after 1,048,576 flights counts as
+    absorbed: some of it in a half space that absorbs nothing, next to none elsewhere.
 
     Args:
         photons: to follow in each channel.
@@ -156,38 +138,44 @@ def trace(
         label: of the progress bar, which shows on a terminal only.
 
     Raises:
-        InputError: for what is not a stack, fewer than one photon or more than 2^32 - 1, and a negative seed.
+        InputError: for what is not a stack, less than one photon or 2^31 and more, a negative seed.
     """
     from tqdm import tqdm
 
     layers = stack(layers)
-    if not (isinstance(photons, int | np.integer) and 1 <= photons < 2**32):
-        raise InputError(f"photons must be a whole number from 1 to {2**32 - 1}, not {photons}")
+    if not (isinstance(photons, int | np.integer) and 1 <= photons < 2**31):
+        raise InputError(f"photons must be a whole number from 1 to {2**31 - 1}, not {photons}")
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"seed must be a whole number of at least 0, not {seed}")
-    if not 1.0 <= eta_below < np.inf:
+    if not (isinstance(eta_below, int | float | np.number) and 1.0 <= eta_below < np.inf):
         raise InputError(f"eta_below must be a number of at least 1, not {eta_below}")
-    gpu = gpu or default_gpu()
     shortest = 1.0 / max(layer.sigma_t_prime.max() for layer in layers)
     innermost = int(np.float32((_NEAREST * shortest) ** 2).view(np.uint32) >> 20)
-    rings = load(_MODULE).constants["BINS"]
-    edges = ((innermost + 1 + np.arange(rings - 1, dtype=np.uint32)) << 20).view(np.float32).astype(np.float64)
-
     with tqdm(total=3 * photons, desc=label, unit=" photons", unit_scale=True, file=sys.stderr, disable=None) as bar:
-        tracer = _Tracer(gpu, photons, innermost, bar)
-        counts = [tracer.follow(_packed(layers, eta_below, channel), seed, channel) for channel in range(3)]
+        tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, bar)
+        keys = [np.random.SeedSequence([seed, channel]).generate_state(2) for channel in range(3)]
+        counts = [tracer.follow(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]
     share = np.stack([count.share for count in counts], axis=-1)
     error = np.stack([count.error for count in counts], axis=-1)
+
+    rings = tracer.rings
+    squares = ((innermost + 1 + np.arange(rings - 1, dtype=np.uint32)) << 20).view(
+        np.float32
+    )  # as `ring` of the module
+    edges = np.sqrt(np.concatenate([[0.0], squares], dtype=np.float64))
+    area = np.pi * np.diff(np.square(edges))[:, None]
     eta = float(layers[0].eta)
     return Photons(
-        edges=np.sqrt(np.concatenate([[0.0], edges])),
-        reflected=share[:rings],
-        reflected_error=error[:rings],
-        transmitted=share[rings : 2 * rings],
-        transmitted_error=error[rings : 2 * rings],
-        total_error=error[-3],
-        total_transmittance_error=error[-2],
-        absorbed=share[-1],
+        edges=edges,
+        R=share[: rings - 1] / area,
+        R_error=error[: rings - 1] / area,
+        T=share[rings : 2 * rings - 1] / area,
+        T_error=error[rings : 2 * rings - 1] / area,
+        R_outside=share[rings - 1],
+        T_outside=share[2 * rings - 1],
+        total_error=error[-2],
+        total_transmittance_error=error[-1],
+        absorbed=share[2 * rings],
         specular=((eta - 1.0) / (eta + 1.0)) ** 2,
         photons=int(photons),
     )
@@ -210,7 +198,7 @@ def _packed(layers: Sequence[Layer], eta_below: float, channel: int) -> list[dic
 
 
 class _Count:
-    """Sums over batches of what each was counted to: rings and totals of both sides, absorbed."""
+    """Sums over batches of what was tallied."""
 
     def __init__(self) -> None:
         self.photons = self.batches = self.squared_sizes = 0
@@ -218,23 +206,23 @@ class _Count:
         self.squares: Any = 0.0
         self.products: Any = 0.0
 
-    def add(self, values: Array, sizes: NDArray[np.int64]) -> None:
-        """Batches: their tallies (batches, n), and how many photons each had."""
+    def add(self, tallies: Array, sizes: NDArray[np.int64]) -> None:
+        """Tallies (batches, n), and how many photons each batch had."""
         self.photons += int(sizes.sum())
         self.batches += len(sizes)
         self.squared_sizes += int(np.square(sizes).sum())
-        self.sum += values.sum(axis=0)
-        self.squares += np.square(values).sum(axis=0)
-        self.products += sizes @ values
+        self.sum += tallies.sum(axis=0)
+        self.squares += np.square(tallies).sum(axis=0)
+        self.products += sizes @ tallies
 
     @property
     def share(self) -> Array:
-        """Mean over photons."""
+        """Mean over photons (n,)."""
         return self.sum / self.photons
 
     @property
     def error(self) -> Array:
-        """Standard error of `share`: batches about what they would hold if they were all alike."""
+        """Standard error of `share` (n,): the spread of batches about what they would hold if they were all alike."""
         if self.batches == 1:
             return np.full_like(self.sum, np.inf)
         spread = self.squares - 2.0 * self.share * self.products + np.square(self.share) * self.squared_sizes
@@ -242,38 +230,40 @@ class _Count:
 
 
 class _Tracer:
-    """Follows a channel's photons, as many at a time as the device gets done in a moment."""
+    """Follows one channel's photons after another's."""
 
     def __init__(self, gpu: Gpu, photons: int, innermost: int, bar: Any) -> None:
         self.gpu, self.photons, self.innermost, self.bar = gpu, photons, innermost, bar
-        module = load(_MODULE)
-        self.lanes, self.bins = module.constants["LANES"], module.constants["BINS"]
         self.batch = min(_BATCH, -(-photons // _BATCHES))
+        module = wgsl.load(_MODULE)
+        self.rings, self.slots = module.constants["RINGS"], module.constants["TALLIES"]
+        # Enough to occupy the device, and few enough that a dispatch takes a moment.
+        self.lanes = module.constants["LANES"] * (32 if gpu.is_cpu else 2048)
+        self.idle = bytes(module.layout("Work").size + module.layout("Photon").size * (self.lanes - 1))
 
-    def follow(self, layers: list[dict[str, float]], seed: int, channel: int) -> _Count:
+    def follow(self, layers: list[dict[str, float]], key: NDArray[Any]) -> _Count:
+        """Photons through `layers` with the random numbers of `key`: each ring, what was absorbed, and both totals."""
         count = _Count()
-        key = np.random.SeedSequence([seed, channel]).generate_state(2)
-        first, batches = 0, 4
-        while first < self.photons:
-            end = min(first + batches * self.batch, self.photons)
-            start = time.perf_counter()
-            params = {"key": key, "first": first, "end": end, "batch": self.batch, "innermost": self.innermost}
+        for first in range(0, self.photons, _ROUND * self.batch):
+            end = min(first + _ROUND * self.batch, self.photons)
             sizes = np.diff(np.append(np.arange(first, end, self.batch), end))
-            count.add(self._run(len(sizes), layers, params), sizes)
-            spent = time.perf_counter() - start
-            self.bar.update(end - first)
-            first = end
-            batches = max(1, int(batches * min(4.0, _SUBMISSION_S / spent)))
-            batches = min(batches, 16384)
+            params = {"key": key, "first": first, "end": end, "batch": self.batch, "innermost": self.innermost}
+            tallies = self._round(len(sizes), end - first, layers=layers, params=params)
+            totals = [tallies[:, i : i + self.rings].sum(axis=1) for i in (0, self.rings)]
+            count.add(np.column_stack([tallies, *totals]), sizes)
         return count
 
-    def _run(self, batches: int, layers: list[dict[str, float]], params: dict[str, Any]) -> Array:
-        """Tallies (batches, 2 * bins + 3) of one dispatch, a photon counting 1."""
-        graph = Graph(self.gpu)
-        out = graph.dispatch(_MODULE, size=batches * self.lanes, layers=layers, params=params)
-        graph.run(out.tallies, out.absorbed)
-        rings = graph.read(out.tallies)
-        reflected, transmitted = (rings[side].reshape(batches, self.bins) for side in ("reflected", "transmitted"))
-        absorbed = graph.read(out.absorbed).reshape(batches, self.lanes).sum(axis=1, dtype=np.uint64)
-        totals = [side.sum(axis=1, dtype=np.uint64) for side in (reflected, transmitted)]
-        return np.column_stack([reflected, transmitted, *totals, absorbed]) / 2.0**21
+    def _round(self, batches: int, photons: int, **bindings: Any) -> Array:
+        """Tallies (batches, slots) of photons of full weight."""
+        work, tallies = self.gpu.buffer(self.idle), self.gpu.buffer(bytes(4 * batches * self.slots))
+        ended, on_their_way = 0, photons
+        while on_their_way:
+            graph = Graph(self.gpu)
+            busy = graph.dispatch(_MODULE, size=self.lanes, work=work, tallies=tallies, **bindings)
+            graph.run(busy)
+            on_their_way = int(graph.read(busy).sum())
+            taken = int(np.frombuffer(self.gpu.queue.read_buffer(work, 0, 4), np.uint32)[0])
+            self.bar.update(min(taken, photons) - on_their_way - ended)
+            ended = min(taken, photons) - on_their_way
+        counted = np.frombuffer(self.gpu.queue.read_buffer(tallies), np.uint32)
+        return counted.reshape(batches, self.slots) / 2.0**21
