@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wgsss.optics.borshukov_lewis import BorshukovLewis
 from wgsss.optics.burley import NormalizedDiffusion
 from wgsss.optics.dipole import BetterDipole, Dipole
 from wgsss.optics.fit import fit_error, fit_gaussians, fit_shared_gaussians
@@ -17,6 +18,7 @@ from wgsss.optics.thin import blend
 __all__ = [
     "SKIN_GAUSSIANS",
     "BetterDipole",
+    "BorshukovLewis",
     "Dipole",
     "Layer",
     "Layers",

@@ -8,21 +8,13 @@ from numpy.typing import NDArray
 from wgsss.errors import InputError
 from wgsss.optics.gaussians import SumOfGaussians, gaussian
 from wgsss.optics.profile import Profile
+from wgsss.optics.samples import DISTANCES, MEASURE, levelled, raw, root_energy, scale
 
 Array = NDArray[np.float64]
-
-# Ten decades of distances about a profile's own scale. The integrands are smooth in log r and vanish at both ends,
-# where the trapezoid rule converges faster than any power of the step.
-_R = np.geomspace(1e-5, 1e5, 400)
-_MEASURE = (np.square(_R) * np.log(_R[1] / _R[0]))[:, None]  # r dr
 
 # The first guess spreads the Gaussians between the radii that hold these shares of the light. For the twelve measured
 # materials no random start was found to end lower.
 _START = (0.05, 0.97)
-
-# Where R is infinite at r = 0, so is the integral of eq. 2, and the best Gaussian would be a needle that nobody sees.
-# Such a profile is fitted as if it were level within the radius that holds this share of its light.
-_CORE = 0.01
 
 
 def fit_gaussians(profile: Profile, k: int = 6) -> SumOfGaussians:
@@ -43,8 +35,8 @@ def fit_gaussians(profile: Profile, k: int = 6) -> SumOfGaussians:
     if isinstance(profile, SumOfGaussians) and len(profile.variances) <= k:
         variances = np.broadcast_to(profile.variances.T, profile.weights.shape[::-1]).T
         return SumOfGaussians(variances, profile.weights)
-    unit = _scale(profile)
-    R = _sampled(profile, unit)
+    unit = scale(profile)
+    R = levelled(profile, unit)
     variances, weights = np.ones((k, 3)), np.zeros((k, 3))
     for c in np.flatnonzero(R.any(axis=0)):
         v, w = _nearest(R[:, [c]], None, k)
@@ -71,23 +63,23 @@ def fit_shared_gaussians(profile: Profile, k: int = 6) -> SumOfGaussians:
     if lit.size == 0:
         return SumOfGaussians(np.ones(1), np.zeros((1, 3)))
     # In steps of four decades, which leaves three of the ten at least on either side.
-    unit = 10.0 ** (4.0 * np.round(np.log10(_scale(profile)[lit]).mean() / 4.0))
-    variances, found = _nearest(_sampled(profile, np.full(3, unit))[:, lit], total[lit], k)
+    unit = 10.0 ** (4.0 * np.round(np.log10(scale(profile)[lit]).mean() / 4.0))
+    variances, found = _nearest(levelled(profile, np.full(3, unit))[:, lit], total[lit], k)
     weights = np.zeros((len(variances), 3))
     weights[:, lit] = found
     return SumOfGaussians(variances * np.square(unit), weights)
 
 
-def fit_error(profile: Profile, fit: SumOfGaussians) -> Array:
+def fit_error(profile: Profile, fit: Profile) -> Array:
     """Relative error (3,) of a fit: the root of int r (R - S)^2 dr over int r R^2 dr; 0 for a black channel.
 
     In percent this is the error that 003 quotes below its eq. 2. A profile that is infinite at r = 0 counts as level
     near there, as in `fit_gaussians`.
     """
-    unit = _scale(profile)
-    wanted = _sampled(profile, unit)
-    energy = _energy(wanted)
-    return _energy(_each(fit, unit) - wanted) / np.where(energy > 0, energy, 1.0)
+    unit = scale(profile)
+    wanted = levelled(profile, unit)
+    energy = root_energy(wanted)
+    return root_energy(raw(fit, unit) - wanted) / np.where(energy > 0, energy, 1.0)
 
 
 def _check(k: int) -> None:
@@ -95,37 +87,12 @@ def _check(k: int) -> None:
         raise InputError(f"a fit needs at least one Gaussian, not {k}")
 
 
-def _scale(profile: Profile) -> Array:
-    """The distance (3,) in mm within which about half of the light leaves; 1 for a black channel."""
-    r = np.geomspace(1e-12, 1e12, 400)
-    inside = np.cumsum(np.square(r)[:, None] * profile.reflectance(r), axis=0)
-    return np.where(inside[-1] > 0, r[(inside < 0.5 * inside[-1]).sum(axis=0)], 1.0)
-
-
-def _each(profile: Profile, unit: Array) -> Array:
-    """R (n, 3) in 1/unit^2 at the distances `_R` in a `unit` (3,) per channel."""
-    return np.square(unit) * np.einsum("ncc->nc", profile.reflectance(_R[:, None] * unit))
-
-
-def _sampled(profile: Profile, unit: Array) -> Array:
-    """R as `_each` gives it, levelled where it is infinite at r = 0."""
-    R = _each(profile, unit)
-    inside = np.cumsum(_MEASURE * R, axis=0)
-    level = np.where(inside < _CORE * inside[-1], 0.0, R).max(axis=0)
-    return np.where(np.isinf(profile.reflectance(0.0)), np.minimum(R, level), R)
-
-
-def _energy(R: Array) -> Array:
-    """The root (c,) of the integral of r R^2 dr."""
-    return np.sqrt((_MEASURE * np.square(R)).sum(axis=0))
-
-
 def _nearest(R: Array, total: Array | None, k: int) -> tuple[Array, Array]:
-    """The variances (n <= k,), ascending, and weights (n, c) of the sum nearest to the samples `R` (_R.size, c)."""
-    energy = _energy(R)
-    problem = _Separable(np.sqrt(_MEASURE) * R / energy, None if total is None else total / energy)
-    inside = np.cumsum(_MEASURE * R, axis=0)
-    low, high = (_R[(inside < share * inside[-1]).sum(axis=0)] for share in _START)
+    """The variances (n <= k,), ascending, and weights (n, c) of the sum nearest to the samples `R` (n, c)."""
+    energy = root_energy(R)
+    problem = _Separable(np.sqrt(MEASURE) * R / energy, None if total is None else total / energy)
+    inside = np.cumsum(MEASURE * R, axis=0)
+    low, high = (DISTANCES[(inside < share * inside[-1]).sum(axis=0)] for share in _START)
     log_variance, weights = problem.minimise(2.0 * np.linspace(np.log(low.min()), np.log(high.max()), k))
     kept = [i for i in np.argsort(log_variance) if weights[i].any()]
     return np.exp(log_variance[kept]), weights[kept] * energy
@@ -166,8 +133,8 @@ class _Separable:
     def linearise(self, log_variance: Array) -> tuple[Array, Array, Array]:
         """Residual (n*c,), its derivative by the log variances (n*c, k) after Kaufman, and the weights (k, c)."""
         variance = np.exp(log_variance)
-        basis = np.sqrt(_MEASURE) * gaussian(variance, _R[:, None])
-        slope = basis * (np.square(_R)[:, None] / (2.0 * variance) - 1.0)
+        basis = np.sqrt(MEASURE) * gaussian(variance, DISTANCES[:, None])
+        slope = basis * (np.square(DISTANCES)[:, None] / (2.0 * variance) - 1.0)
         weights = np.stack(
             [_weights(basis, y, total) for y, total in zip(self.wanted.T, self.total, strict=True)], axis=1
         )
