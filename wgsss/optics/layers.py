@@ -15,6 +15,7 @@ from wgsss.optics.profile import Profile, distances, shares
 from wgsss.optics.slab import (
     SlabSpectra,
     Spectrum,
+    check_alone,
     check_below,
     check_thickness,
     decay,
@@ -38,7 +39,8 @@ class Layers(Profile):
     passes from layer to layer starts anew a mean free path deep, so that splitting a layer in two changes the result.
 
     The profile is what leaves at the top, `transmittance` what leaves at the bottom, per unit of flux that entered.
-    They are good to 1e-13 of the total over 2 pi r^2, and 0 where rounding, or the model itself, makes them negative.
+    They are good to 1e-14 of the total over 2 pi r^2, and 0 where rounding makes them negative, or the model itself:
+    with layers of hardly more than a mean free path that happens far out, to 0.2 % of R and 2 % of T at most.
     """
 
     layers: Sequence[Layer]
@@ -49,6 +51,8 @@ class Layers(Profile):
         check_below(self.eta_below)
         for number, layer in enumerate(self.layers, start=1):
             check_thickness(layer, layer.thickness, f"thickness of layer {number}")
+        if len(self.layers) == 1:
+            check_alone(self.layers[0], self.layers[0].thickness, self.eta_below)
 
     @property
     def total(self) -> Array:
@@ -86,7 +90,7 @@ class Layers(Profile):
 
     def _resolved(self, r: ArrayLike) -> Array:
         """Distances, but for those so small that profiles are flat there."""
-        return np.maximum(distances(r), 1e-6 * min(layer.mean_free_path.min() for layer in self.layers))
+        return np.maximum(distances(r), 1e-5 * min(layer.mean_free_path.min() for layer in self.layers))
 
     def _spectra(self, k: ArrayLike) -> SlabSpectra:
         indices = [1.0, *(layer.eta for layer in self.layers), self.eta_below]

@@ -70,6 +70,20 @@ def check_thickness(medium: Medium, thickness: float, name: str) -> None:
             )
 
 
+def check_alone(medium: Medium, thickness: float, eta_below: float) -> None:
+    """Raises InputError where a slab under air would reflect a negative amount far from the light's entry.
+
+    There the fluence is half a sine between the extrapolated boundaries, and falls towards the top only above its peak.
+    """
+    above, below = extrapolation(medium, 1.0, eta_below)
+    for channel, length, least in zip(CHANNELS, medium.mean_free_path, above - below, strict=True):
+        if thickness < least:
+            raise InputError(
+                f"thickness must be at least {least:.4g} mm in {channel}, of mean free path {length:.4g} mm, over an "
+                f"index of {eta_below:g}, or R would be negative far out, not {thickness:g}"
+            )
+
+
 def check_below(eta: float) -> None:
     """Raises InputError unless the index of what lies below is a number of at least 1."""
     if not (isinstance(eta, int | float | np.number) and 1.0 <= eta < math.inf):
