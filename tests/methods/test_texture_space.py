@@ -78,6 +78,12 @@ def test_edge_on_skin(gpu):
     assert edge_error(gpu, plane(cells=4), 1024, SKIN) < 0.015
 
 
+def test_edge_on_a_material_with_variances_of_its_own_per_channel(gpu):
+    """They are fitted by shared ones, which the blurs need."""
+    own = SumOfGaussians(np.array([[0.1, 0.2, 0.3], [3.0, 2.0, 1.0]]), np.array([[0.5, 0.2, 0.7], [0.1, 0.2, 0.3]]))
+    assert edge_error(gpu, plane(cells=4), 512, replace(MATTE, gaussians=own)) < 0.015
+
+
 def diffused_map(gpu, scene, monkeypatch, map_size=512):
     """M_front over the atlas, all of its Gaussians on maps of one size; the body and its charts."""
     monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)

@@ -16,6 +16,7 @@ from wgsss.optics import (
     fit_gaussians,
     fit_shared_gaussians,
 )
+from wgsss.optics.fit import _weights
 from wgsss.scene import MATERIALS
 
 MEASURED = {name: material.profile for name, material in MATERIALS.items() if material.gaussians is None}
@@ -66,6 +67,18 @@ def test_no_other_weights_are_better(measured):
         rows = np.vstack([np.stack(columns, axis=1) / norm, np.full(6, 1e4 / profile.total[channel])])
         weights, _ = nnls(rows, np.append(wanted / norm, 1e4))
         np.testing.assert_allclose(fit.weights[:, channel], weights, atol=2e-4 * profile.total[channel])
+
+
+@pytest.mark.parametrize("total", [None, 0.1, 5.0])
+def test_weights_are_the_least_squares_of_lawson_and_hanson(total):
+    """Among so many random problems are some that want a weight back which was 0 on the way."""
+    rng = np.random.default_rng(2)
+    for _ in range(500):
+        basis, wanted = rng.standard_normal((12, 6)) + 2 * rng.random(), rng.standard_normal(12) + 0.5
+        found = _weights(basis, wanted, total)
+        if total is not None:  # as one heavy row
+            basis, wanted = np.vstack([basis, np.full(6, 1e5)]), np.append(wanted, 1e5 * total)
+        np.testing.assert_allclose(found, nnls(basis, wanted)[0], atol=1e-6)
 
 
 def test_no_near_variances_are_better(skin):
