@@ -17,7 +17,7 @@ fn random_words(key: vec4u) -> vec4u {
     return v;
 }
 
-// Four random numbers above 0, up to 1.
-fn random_numbers(key: vec4u) -> vec4f {
-    return (vec4f(random_words(key)) + 0.5) * 2.3283064365386963e-10; // 2^-32
+// Random numbers above 0, up to 1, of random words. They do not tell a word's last bits.
+fn random_numbers(words: vec4u) -> vec4f {
+    return (vec4f(words) + 0.5) * 2.3283064365386963e-10; // 2^-32
 }

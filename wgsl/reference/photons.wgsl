@@ -1,19 +1,37 @@
+// Photons through a stack of plane layers, from a beam that has entered its top at a right angle.
+//
+// The method of Wang, Jacques and Zheng 1995 (MCML): flights of random length, a share of the weight absorbed at each
+// scattering, Henyey and Greenstein's phase function, reflection or refraction by chance where indices differ, roulette.
+//
+// In a medium that absorbs next to nothing paths would have no end. Deep inside of it a photon leaps: far from boundaries
+// light diffuses, so that it leaves a sphere about the point that its path tends to, a transport mean free path ahead,
+// anywhere with equal likelihood, and with its weight times x / sinh(x), x = sigma_tr * radius.
+//
+// A lane whose photon has ended takes the next one, so that lanes do not wait for the longest path. Lanes keep what they
+// do from one dispatch to the next, so that none takes long. A photon's random numbers follow from its own number and
+// tallies are integers, so that the result does not depend on which lane took which photon, or when.
+
 import package::units::{Length, Number, PI};
-import package::random::{random_numbers};
+import package::random::{random_words, random_numbers};
 
 const LANES: u32 = 64u;         // of a workgroup
 const AT_ONCE: u32 = 4096u;     // flights of a lane in one dispatch; lavapipe ends a shader's loops after 65,535 turns
 const RINGS: u32 = 384u;
 const TALLIES: u32 = 769u;      // of a batch: rings of what is reflected, of what is transmitted, what is absorbed
 const ONE: f32 = 2097152.0;     // 2^21, the tally of a photon of full weight: batches are of at most 1024
-const LONGEST: u32 = 1048576u;  // flights; what is still inside after them counts as absorbed
 const FAINT: Number = 1e-4;     // weight below which a photon lives on with a chance of SURVIVAL
 const SURVIVAL: Number = 0.125;
+const DEEP: Number = 24.0;      // transport mean free paths from the boundaries of a layer from which a photon leaps
+const MARGIN: Number = 8.0;     // that a leap keeps from them
+
+override LEAPS: u32 = 0u;       // 1 where there is a layer to leap in
 
 struct Layer {
     sigma_t: Number,    // 1/mm
     absorbed: Number,   // share of the weight that a scattering takes
     g: Number,
+    transport: Length,  // transport mean free path, 1 / sigma_t'; endless where leaps would be wrong
+    sigma_tr: Number,   // 1/mm
     thickness: Length,
     above: Number,      // index over that of what lies above
     below: Number,      // index over that of what lies below
@@ -32,7 +50,7 @@ struct Photon {
     p: vec3f,         // mm; z is the depth below the top of the layer
     weight: Number,   // 0 once it has ended
     w: vec3f,         // direction
-    absorbed: Number, // weight lost
+    stock: Number,    // weight and what was absorbed of it: 1, but for roulette
     number: u32,
     flight: u32,
     layer: u32,
@@ -74,7 +92,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
     for (var turn = 0u; turn < AT_ONCE; turn++) {
         if photon.weight == 0.0 {
-            photon = Photon(vec3f(0.0), 1.0, vec3f(0.0, 0.0, 1.0), 0.0, params.first + atomicAdd(&work.taken, 1u), 0u, 0u);
+            photon = Photon(vec3f(0.0), 1.0, vec3f(0.0, 0.0, 1.0), 1.0, params.first + atomicAdd(&work.taken, 1u), 0u, 0u);
             more = photon.number < params.end;
         }
         if !more {
@@ -82,16 +100,30 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             break;
         }
         let here = layers[photon.layer];
-        let u = random_numbers(vec4u(photon.number, photon.flight, params.key));
+        let words = random_words(vec4u(photon.number, photon.flight, params.key));
+        let u = random_numbers(words);
         photon.flight++;
 
         let down = photon.w.z > 0.0;
         let cosine = abs(photon.w.z);
         let free = -log(u.x) / here.sigma_t;
         let wall = select(photon.p.z, here.thickness - photon.p.z, down) / max(cosine, 1e-9);
-        photon.p += photon.w * min(free, wall);
+        let room = min(photon.p.z, here.thickness - photon.p.z);
+        let leap = LEAPS == 1u && room > DEEP * here.transport;
         let tally = (photon.number - params.first) / params.batch * TALLIES;
-        if wall < free {
+        var g = here.g;
+        var share = here.absorbed;
+        if leap {
+            let radius = min(room - (MARGIN + 1.0) * here.transport, 1.0 / here.sigma_tr);
+            photon.p += here.transport * photon.w + radius * scattered(photon.w, 2.0 * u.x - 1.0, 2.0 * PI * u.w);
+            let x2 = radius * radius * here.sigma_tr * here.sigma_tr;
+            let series = x2 / 6.0 * (1.0 + x2 / 20.0 * (1.0 + x2 / 42.0)); // of sinh(x) / x - 1
+            share = series / (1.0 + series);
+            g = 0.0;
+        } else {
+            photon.p += photon.w * min(free, wall);
+        }
+        if !leap && wall < free {
             let eta = select(here.above, here.below, down);
             // The squared cosine of the refracted ray, exact where indices are equal.
             let squared = (1.0 - eta * eta) + eta * eta * cosine * cosine;
@@ -105,6 +137,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 let from_innermost = max(ring(photon.p.x, photon.p.y), params.innermost) - params.innermost;
                 let hit = min(from_innermost, RINGS - 1u) + select(0u, RINGS, down);
                 atomicAdd(&tallies[tally + hit], u32(photon.weight * ONE + 0.5));
+                photon.stock -= photon.weight;
                 photon.weight = 0.0;
             } else {
                 photon.w = vec3f(eta * photon.w.xy, select(-refracted, refracted, down));
@@ -112,25 +145,20 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 photon.p.z = select(layers[photon.layer].thickness, 0.0, down);
             }
         } else {
-            let part = photon.weight * here.absorbed;
-            photon.absorbed += part;
-            photon.weight -= part;
+            photon.weight -= photon.weight * share;
             if photon.weight < FAINT {
-                photon.weight = select(0.0, photon.weight / SURVIVAL, u.w < SURVIVAL);
-            }
-            if photon.flight >= LONGEST {
-                photon.absorbed += photon.weight;
-                photon.weight = 0.0;
+                let kept = select(0.0, photon.weight / SURVIVAL, f32(words.w & 7u) < 8.0 * SURVIVAL);
+                photon.stock += kept - photon.weight;
+                photon.weight = kept;
             }
             // Henyey and Greenstein's cosine, written so that g may be 0.
             let v = 2.0 * u.y - 1.0;
-            let g = here.g;
             let q = 1.0 + g * v;
             let forward = (0.5 * g * (3.0 - g * g) + (1.0 + g * g) * v * (1.0 + 0.5 * g * v)) / (q * q);
             photon.w = scattered(photon.w, clamp(forward, -1.0, 1.0), 2.0 * PI * u.z);
         }
         if photon.weight == 0.0 {
-            atomicAdd(&tallies[tally + 2u * RINGS], u32(photon.absorbed * ONE + 0.5));
+            atomicAdd(&tallies[tally + 2u * RINGS], u32(max(photon.stock, 0.0) * ONE + 0.5));
         }
     }
     work.lanes[id.x] = photon;

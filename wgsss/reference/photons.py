@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _MODULE = "reference/photons"
 _NEAREST = 1 / 256  # the least radius told apart, of the shortest mean free path
 _ENDLESS = 1e20  # mm; still finite in float32 once divided by the flattest direction's cosine
+_CLEAR = 1e-4  # share of sigma_t' that may be absorption where photons leap
 _BATCH = 1024  # photons at most, so that tallies do not overflow
 _BATCHES = 64  # at least, where there are so many photons, for an error to be told from their spread
 _ROUND = 8192  # batches tallied before they are read: 24 MiB
@@ -127,8 +128,8 @@ def trace(
 ) -> Photons:
     """Follow photons through a stack of layers, from the top down: the method of Wang, Jacques and Zheng 1995 (MCML).
 
-    Equal arguments give equal bits on one adapter. Light that is still inside after 1,048,576 flights counts as
-    absorbed: some of it in a half space that absorbs nothing, next to none elsewhere.
+    Equal arguments give equal bits on one adapter. Where next to nothing absorbs, light deep inside of a layer moves by
+    diffusion in leaps, far from its boundaries: `wgsl/reference/photons.wgsl` says how.
 
     Args:
         photons: to follow in each channel.
@@ -189,6 +190,8 @@ def _packed(layers: Sequence[Layer], eta_below: float, channel: int) -> list[dic
             "sigma_t": layer.sigma_a[channel] + layer.sigma_s[channel],
             "absorbed": layer.sigma_a[channel] / (layer.sigma_a[channel] + layer.sigma_s[channel]),
             "g": layer.g,
+            "transport": layer.mean_free_path[channel] if layer.albedo[channel] >= 1.0 - _CLEAR else _ENDLESS,
+            "sigma_tr": max(layer.sigma_tr[channel], 1.0 / _ENDLESS),
             "thickness": min(layer.thickness, _ENDLESS),
             "above": layer.eta / indices[i],
             "below": layer.eta / indices[i + 2],
@@ -256,10 +259,11 @@ class _Tracer:
     def _round(self, batches: int, photons: int, **bindings: Any) -> Array:
         """Tallies (batches, slots) of photons of full weight."""
         work, tallies = self.gpu.buffer(self.idle), self.gpu.buffer(bytes(4 * batches * self.slots))
+        constants = {"LEAPS": any(layer["transport"] < _ENDLESS for layer in bindings["layers"])}
         ended, on_their_way = 0, photons
         while on_their_way:
             graph = Graph(self.gpu)
-            busy = graph.dispatch(_MODULE, size=self.lanes, work=work, tallies=tallies, **bindings)
+            busy = graph.dispatch(_MODULE, size=self.lanes, work=work, tallies=tallies, constants=constants, **bindings)
             graph.run(busy)
             on_their_way = int(graph.read(busy).sum())
             taken = int(np.frombuffer(self.gpu.queue.read_buffer(work, 0, 4), np.uint32)[0])
