@@ -18,7 +18,7 @@ from wgsss.scene import EnvironmentLight, load_material, load_scene
 
 EXAMPLES = ROOT / "examples"
 README = (ROOT / "README.md").read_text()
-MATERIALS = ["jade"]
+MATERIALS = ["jade", "layers"]
 SCENES = sorted({path.stem for path in EXAMPLES.glob("*.toml")} - set(MATERIALS))
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, unknown
-from wgsss.optics import SKIN_GAUSSIANS, Dipole, SumOfGaussians
+from wgsss.optics import SKIN_GAUSSIANS, Dipole, Layer, Layers, Profile, SumOfGaussians, Tabulated
+from wgsss.optics.medium import coefficients, stack
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
 
@@ -38,10 +39,11 @@ class Maps:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A homogeneous translucent medium below a rough dielectric surface.
+    """A translucent medium below a rough dielectric surface.
 
-    The medium is given either by its coefficients (sigma_a and sigma_s_prime) or by a tabulated profile (gaussians).
-    Raises InputError naming the field that is out of range.
+    The medium is given in one of four ways: by the coefficients of a homogeneous one (sigma_a and sigma_s_prime), as
+    layers of such, or by its profile alone, a sum of Gaussians or a table.
+    Raises InputError naming the field that is out of range, and for the medium the material and the channel.
     """
 
     name: str
@@ -50,8 +52,12 @@ class Material:
     sigma_s_prime: Triple | None = None
     """reduced scattering, 1/mm"""
     eta: float = 1.3
-    """index of refraction relative to air"""
+    """index of refraction relative to air; of the top layer, where there are layers"""
+    layers: tuple[Layer, ...] | None = None
+    """layers from the top down, in place of the coefficients"""
     gaussians: SumOfGaussians | None = None
+    """a diffusion profile as a sum of Gaussians, in place of the coefficients"""
+    table: Tabulated | None = None
     """a tabulated diffusion profile, in place of the coefficients"""
     roughness: float = 0.35
     """perceptual roughness; GGX alpha = roughness^2. Below 0.02 a highlight falls between pixels"""
@@ -64,30 +70,59 @@ class Material:
     maps: Maps = field(default_factory=Maps)
 
     def __post_init__(self) -> None:
-        if self.gaussians is None:
-            if self.sigma_a is None or self.sigma_s_prime is None:
-                missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
-                raise InputError(f"{missing} is missing: a material needs sigma_a and sigma_s_prime, or gaussians")
-            checks.triple(self, "sigma_a", 0, 1e6)
-            checks.triple(self, "sigma_s_prime", 1e-6, 1e6)
-        elif not isinstance(self.gaussians, SumOfGaussians):
-            raise InputError("gaussians must be a SumOfGaussians (variances in mm^2, weights per channel)")
-        elif self.sigma_a is not None or self.sigma_s_prime is not None:
-            raise InputError("gaussians stand in place of sigma_a and sigma_s_prime: give one or the other")
+        given = [name for name in IN_PLACE if getattr(self, name) is not None]
+        if len(given) > 1 or (given and (self.sigma_a is not None or self.sigma_s_prime is not None)):
+            raise InputError(f"{given[0]} stand in place of sigma_a and sigma_s_prime: give one or the other")
         checks.number(self, "eta", 1, 3)
+        try:
+            self._check_medium()
+        except InputError as error:
+            raise InputError(f"material '{self.name}': {error}") from None
         checks.number(self, "roughness", 0.02, 1)
         checks.number(self, "specular", 0, 1)
         checks.triple(self, "base_color", 0, 1)
         checks.number(self, "color_after", 0, 1)
 
+    def _check_medium(self) -> None:
+        for name, kind in (("gaussians", SumOfGaussians), ("table", Tabulated)):
+            if not isinstance(getattr(self, name), kind | None):
+                raise InputError(f"{name} must be a {kind.__name__}")
+        if self.layers is not None:
+            object.__setattr__(self, "layers", stack(self.layers))
+            object.__setattr__(self, "eta", self.layers[0].eta)
+            _ = self.profile  # refuses what diffusion cannot do
+        elif self.gaussians is None and self.table is None:
+            if self.sigma_a is None or self.sigma_s_prime is None:
+                missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
+                raise InputError(
+                    f"{missing} is missing: a material needs sigma_a and sigma_s_prime, or {', '.join(IN_PLACE)}"
+                )
+            for name, least in (("sigma_a", 0.0), ("sigma_s_prime", 1e-6)):
+                sigma = coefficients(name, getattr(self, name), least, unit="1/mm", high=1e6)
+                object.__setattr__(self, name, tuple(sigma.tolist()))
+
     @cached_property
-    def profile(self) -> Dipole | SumOfGaussians:
-        """The diffusion profile R(r), 1/mm^2 per channel."""
+    def stack(self) -> tuple[Layer, ...] | None:
+        """The medium as layers: one without end where it is homogeneous, None where only its profile is known."""
+        if self.sigma_a is None or self.sigma_s_prime is None:
+            return self.layers
+        return (Layer(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta),)
+
+    @cached_property
+    def profile(self) -> Profile:
+        """The diffusion profile R(r), 1/mm^2 per channel: the dipole's, where the medium is homogeneous."""
         if self.gaussians is not None:
             return self.gaussians
+        if self.table is not None:
+            return self.table
+        if self.layers is not None:
+            return Layers(self.layers)
         assert self.sigma_a is not None and self.sigma_s_prime is not None
         return Dipole(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta)
 
+
+IN_PLACE = ("layers", "gaussians", "table")
+"""what can give the medium in place of its coefficients"""
 
 # Measured by Jensen et al. 2001, "A Practical Model for Subsurface Light Transport", figure 5: sigma_s' and sigma_a,
 # 1/mm. Marble alone has an eta of 1.5: only so does the dipole's total give the diffuse reflectance of the same table.

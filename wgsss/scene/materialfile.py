@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.errors import InputError
-from wgsss.optics import SumOfGaussians
+from wgsss.optics import Dipole, Layer, SumOfGaussians, Tabulated
 from wgsss.scene import tables
 from wgsss.scene.images import read_map
-from wgsss.scene.material import MATERIALS, Maps, Material, material
+from wgsss.scene.material import IN_PLACE, MATERIALS, Maps, Material, material
+
+_COEFFICIENTS = ("sigma_a", "sigma_s_prime")
+_INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")
+"""what gives the coefficients through the dipole"""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
 def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Chosen:
     parameters = {key: p for key, p in inspect.signature(Material).parameters.items() if key != "maps"}
     slots = {f"{f.name}_map": f.name for f in fields(Maps)}
-    tables.check_keys(table, [*parameters, *slots, "preset"], where)
+    tables.check_keys(table, [*parameters, *slots, *_INVERTED, "preset"], where)
 
     values: tables.Table = {"name": name}
     if "preset" in table:
@@ -62,13 +66,22 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
         except InputError as error:
             raise tables.at(f"{where}: preset", error) from None
         values = {key: getattr(preset, key) for key in parameters}
-        if "gaussians" in table:
-            values["sigma_a"] = values["sigma_s_prime"] = None
-        elif "sigma_a" in table or "sigma_s_prime" in table:
-            values["gaussians"] = None
+        if any(
+            key in table for key in (*_COEFFICIENTS, *_INVERTED, *IN_PLACE)
+        ):  # another medium takes the place of the preset's
+            kept = _COEFFICIENTS if any(key in table for key in _COEFFICIENTS) else ()
+            values |= dict.fromkeys({*_COEFFICIENTS, *IN_PLACE}.difference(kept))
     values |= {key: value for key, value in table.items() if key in parameters}
+    if any(key in table for key in _INVERTED):
+        values |= _inverted(table, values.get("eta", Material.eta), where)
     if isinstance(values.get("gaussians"), dict):
         values["gaussians"] = tables.call(SumOfGaussians, values["gaussians"], f"{where}: gaussians")
+    if "layers" in table:
+        if "eta" in table:
+            raise InputError(f"{where}: eta is that of the first of the layers: give it there")
+        values["layers"] = [tables.call(Layer, layer, at) for layer, at in tables.each(table, "layers", where)]
+    if "table" in table:
+        values["table"] = Tabulated.read(tables.file_in(table, "table", where, folder))
 
     images = {}
     for key in slots.keys() & table.keys():
@@ -78,6 +91,22 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
         )
     chosen = Chosen(tables.call(Material, values, where), coloured="base_color" in table)
     return replace(chosen, material=chosen.on(Maps(**images)))
+
+
+def _inverted(table: tables.Table, eta: Any, where: str) -> tables.Table:
+    """The coefficients of the medium with a total reflectance and a mean free path, under the dipole's boundary."""
+    if any(key in table for key in (*_COEFFICIENTS, *IN_PLACE)):
+        raise InputError(
+            f"{where}: reflectance and a mean free path stand in place of another medium: give one or the other"
+        )
+    if "reflectance" not in table:
+        raise InputError(f"{where}: key 'reflectance' is missing")
+    lengths = {key: table[key] for key in _INVERTED[1:] if key in table}
+    try:
+        medium = Dipole.from_reflectance(table["reflectance"], eta=eta, **lengths)
+    except InputError as error:
+        raise tables.at(where, error) from None
+    return {"sigma_a": medium.sigma_a, "sigma_s_prime": medium.sigma_s_prime}
 
 
 def _first(*values: Any) -> Any:
