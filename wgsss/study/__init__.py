@@ -1,0 +1,1 @@
+"""What is measured of materials and methods, side by side."""

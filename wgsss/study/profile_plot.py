@@ -1,0 +1,99 @@
+"""Profiles as a picture: R and r R, logarithmic and linear, as in figures 6 and 7 of 004."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wgsss.optics import Profile
+from wgsss.optics.medium import CHANNELS
+from wgsss.output import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito's colours, which all eyes tell apart.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#999999", "#F0E442")
+_MEASURED = "#000000"
+_ROWS = (
+    ("R, 1/mm²", "log", False),
+    ("R, 1/mm²", "linear", False),
+    ("r R, 1/mm", "log", True),
+    ("r R, 1/mm", "linear", True),
+)
+
+
+def plot(found: dict[str, Profile], title: str, path: Path) -> None:
+    """Write a .png or .svg of profiles by name: a column per channel. T, where there is one, is dashed.
+
+    Raises InputError where the file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 14.0), layout="constrained")
+    axes = figure.subplots(len(_ROWS), 3)
+    far = np.max([profile.range(0.01) for profile in found.values()], axis=0)
+    near = np.min([profile.range(0.5) for profile in found.values()], axis=0)
+    for channel, name in enumerate(CHANNELS):
+        reach = far[channel] or 1.0
+        for (label, scale, weighted), axis in zip(_ROWS, axes[:, channel], strict=True):
+            limit = reach if scale == "log" else reach / 3.0
+            r = np.linspace(limit / 2000.0, limit, 600)
+            seen = _lines(axis, found, r, channel, weighted)
+            axis.set_xlim(0.0, limit)
+            _heights(axis, seen, r, near[channel], scale, weighted)
+            axis.set_ylabel(label if channel == 0 else "")
+            axis.grid(alpha=0.25)
+        axes[0, channel].set_title(name)
+        axes[-1, channel].set_xlabel("r, mm")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
+    figure.suptitle(title, x=0.02, ha="left")
+    with replacing(path) as (file,):
+        figure.savefig(file, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
+
+
+def _lines(axis: Axes, found: dict[str, Profile], r: Any, channel: int, weighted: bool) -> list[Any]:
+    """Draw the profiles, and give back their values (n,)."""
+    seen = []
+    scale = r if weighted else 1.0
+    for number, (name, profile) in enumerate(found.items()):
+        R = scale * profile.reflectance(r)[:, channel]
+        if hasattr(profile, "R_error"):
+            _points(axis, name, profile, channel, weighted)
+        else:
+            width = max(2.8 - 0.5 * number, 1.0)  # thinner ones on top, so that none hides another
+            axis.plot(r, R, color=_COLOURS[number % len(_COLOURS)], lw=width, label=name)
+        if profile.total_transmittance[channel] > 0.0:
+            colour = _MEASURED if hasattr(profile, "R_error") else _COLOURS[number % len(_COLOURS)]
+            axis.plot(r, scale * profile.transmittance(r)[:, channel], "--", color=colour, lw=1.0)
+        seen.append(R)
+    return seen
+
+
+def _points(axis: Axes, name: str, profile: Any, channel: int, weighted: bool) -> None:
+    """Bins of a measured profile with their standard errors, where these leave something to see."""
+    inner, outer = profile.edges[:-1], profile.edges[1:]
+    r = np.sqrt(0.5 * (np.square(inner) + np.square(outer)))
+    R, error = profile.R[:, channel], profile.R_error[:, channel]
+    told = (R > 0.0) & (error < 0.3 * R) & np.isfinite(r)
+    scale = r[told] if weighted else 1.0
+    axis.errorbar(
+        r[told], scale * R[told], scale * error[told], fmt=".", ms=2.5, lw=0.7, color=_MEASURED, label=name, zorder=0
+    )
+
+
+def _heights(axis: Axes, seen: list[Any], r: Any, near: float, scale: str, weighted: bool) -> None:
+    """A range of values that shows the curves: near the light some grow without bound, far away all vanish."""
+    values = np.array(seen)[:, r > 0.1 * near]
+    top = values.max(initial=0.0)
+    if top <= 0.0:
+        return
+    if scale == "log":
+        axis.set_yscale("log")
+        least = np.array([curve[curve > 0.0].min(initial=top) for curve in values]).max()
+        axis.set_ylim(0.3 * least, 3.0 * top)
+    else:
+        axis.set_ylim(0.0, 1.1 * top)

@@ -1,0 +1,176 @@
+"""The diffusion profile of one material by several models, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wgsss.errors import InputError, unknown
+from wgsss.optics import (
+    BetterDipole,
+    BorshukovLewis,
+    Dipole,
+    Layer,
+    Layers,
+    Multipole,
+    NormalizedDiffusion,
+    Profile,
+    fit_error,
+)
+from wgsss.scene import Material
+
+Array = NDArray[np.float64]
+
+PHOTONS = 1_000_000
+SAMPLES = 64
+"""distances in a result, where none were asked for"""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What models are asked of: a material, as deep as it goes or `thickness` mm deep, above air.
+
+    `k`: Gaussians of a fit. `photons`: traced per channel. Raises InputError where layers are given another thickness.
+    """
+
+    material: Material
+    thickness: float | None = None
+    k: int = 6
+    photons: int = PHOTONS
+
+    def __post_init__(self) -> None:
+        if self.thickness is not None and self.material.sigma_a is None:
+            raise InputError(f"material '{self.material.name}': a thickness needs sigma_a and sigma_s_prime")
+
+    @cached_property
+    def stack(self) -> tuple[Layer, ...]:
+        """The medium as layers. Raises InputError where it is known by its profile only."""
+        if self.material.stack is None:
+            raise self._lacks("sigma_a and sigma_s_prime")
+        if self.thickness is None:
+            return self.material.stack
+        return (replace(self.material.stack[0], thickness=self.thickness),)
+
+    @cached_property
+    def medium(self) -> Layer:
+        """The medium where it is homogeneous. Raises InputError for others."""
+        if self.material.sigma_a is None:
+            raise self._lacks("sigma_a and sigma_s_prime")
+        return self.stack[0]
+
+    @cached_property
+    def dipole(self) -> Dipole:
+        """The dipole of a homogeneous medium without end."""
+        return Dipole(self.medium.sigma_a, self.medium.sigma_s_prime, self.medium.eta)
+
+    def _lacks(self, what: str) -> InputError:
+        return InputError(f"material '{self.material.name}' has no {what}, which this model needs")
+
+
+def _multipole(case: Case) -> Profile:
+    if case.thickness is None:
+        raise InputError("the model 'multipole' needs a thickness")
+    return Multipole(case.medium.sigma_a, case.medium.sigma_s_prime, case.medium.eta, thickness=case.thickness)
+
+
+def _gaussians(case: Case) -> Profile:
+    return case.material.profile.gaussians(case.k)
+
+
+def _table(case: Case) -> Profile:
+    if case.material.table is None:
+        raise InputError(f"material '{case.material.name}' has no table")
+    return case.material.table
+
+
+def _photons(case: Case) -> Profile:
+    from wgsss.reference.photons import trace
+
+    return trace(case.stack, case.photons, label=f"photons in {case.material.name}")
+
+
+MODELS: dict[str, tuple[Callable[[Case], Profile], str]] = {
+    "dipole": (lambda case: case.dipole, "classical dipole, Jensen et al. 2001"),
+    "better-dipole": (
+        lambda case: BetterDipole(case.medium.sigma_a, case.medium.sigma_s_prime, case.medium.eta),
+        "d'Eon 2012",
+    ),
+    "multipole": (_multipole, "slab of a given thickness, Contini et al. 1997"),
+    "layers": (lambda case: Layers(case.stack), "stack of slabs, Donner & Jensen 2005"),
+    "burley": (
+        lambda case: NormalizedDiffusion.searchlight(case.dipole.total, case.dipole.mean_free_path),
+        "normalized diffusion, Christensen & Burley 2015, for a pencil of light",
+    ),
+    "burley-diffuse": (
+        lambda case: NormalizedDiffusion.diffuse(case.dipole.total, case.dipole.mean_free_path),
+        "the same, for diffuse light",
+    ),
+    "burley-dmfp": (
+        lambda case: NormalizedDiffusion.from_diffuse_mean_free_path(
+            case.dipole.total, case.dipole.diffuse_mean_free_path
+        ),
+        "the same, from the diffuse mean free path",
+    ),
+    "borshukov-lewis": (
+        lambda case: BorshukovLewis.fit(case.material.profile),
+        "1/(c + r)^k, Borshukov & Lewis 2003, fitted",
+    ),
+    "gaussians": (_gaussians, "sum of K Gaussians: the material's own, or fitted to its profile"),
+    "table": (_table, "the material's own table"),
+    "photons": (_photons, "Monte Carlo, with all orders of scattering"),
+}
+"""model -> how it is made, and what it is"""
+
+
+def default_models(case: Case) -> list[str]:
+    """The models that say something of a material and take no time."""
+    if case.thickness is not None:
+        return ["multipole", "dipole"]
+    if case.material.sigma_a is not None:
+        return ["dipole", "better-dipole", "burley", "gaussians"]
+    own = next(name for name in ("layers", "table", "gaussians") if getattr(case.material, name) is not None)
+    return list(dict.fromkeys([own, "gaussians"]))
+
+
+def profiles(case: Case, models: Sequence[str]) -> dict[str, Profile]:
+    """The profile by each model. Raises InputError for a model unknown, or one that the material cannot serve."""
+    for name in models:
+        if name not in MODELS:
+            raise unknown("model", name, MODELS)
+    return {name: MODELS[name][0](case) for name in models}
+
+
+def distances_for(found: dict[str, Profile], n: int = SAMPLES) -> Array:
+    """Distances (n,) in mm that show all of the profiles: from near the light to where 0.1 % is left."""
+    tables = [profile.table(2)[0] for profile in found.values()]
+    return np.geomspace(min(r[0] for r in tables), max(r[-1] for r in tables), n)
+
+
+def described(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
+    """A profile in numbers, as JSON has them: at `r` (n,) mm, its totals, its range and its fit by `k` Gaussians.
+
+    Raises InputError where R is infinite.
+    """
+    R = profile.reflectance(r)
+    if not np.all(np.isfinite(R)):
+        raise InputError(f"R of the model '{name}' is infinite at r = {r[~np.isfinite(R).all(axis=-1)][0]:g} mm")
+    fit = profile.gaussians(k)
+    found: dict[str, Any] = {"model": name, "r_mm": r.tolist(), "R": R.tolist()}
+    if profile.total_transmittance.any():
+        found |= {"T": profile.transmittance(r).tolist(), "total_T": profile.total_transmittance.tolist()}
+    found |= {"total": profile.total.tolist(), "range_mm": profile.range(0.01).tolist()}
+    for error in ("total_error", "total_transmittance_error"):
+        if hasattr(profile, error):
+            found[error.replace("transmittance", "T")] = getattr(profile, error).tolist()
+    variances = np.broadcast_to(fit.variances.reshape(len(fit.variances), -1), fit.weights.shape)
+    found["gaussians"] = {
+        "variances": variances.tolist(),
+        "weights": fit.weights.tolist(),
+        "error": fit_error(profile, fit).tolist(),
+    }
+    return found
