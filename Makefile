@@ -20,6 +20,8 @@ demo: setup ## render pictures into out/
 	@for scene in $(DEMO); do \
 		(set -x; $(BIN)/wgsss render $$scene -o out/$$scene.png) || exit 1; \
 	done
+	$(BIN)/wgsss profile skin1 --model dipole --model better-dipole --model burley --model gaussians --model photons \
+		-o out/skin1_profiles.png
 	@echo "Pictures: $(CURDIR)/out (methods.png shows what diffusion does)"
 
 test: setup ## run the tests
