@@ -20,6 +20,8 @@ import numpy as np
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.methods import METHODS, make_method
+from wgsss.optics import Layer
+from wgsss.reference.photons import trace
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 
@@ -115,9 +117,21 @@ def methods(gpu: Gpu) -> None:
             print(f"{'  prepared in':46}{1e3 * baked:9.2f} ms")
 
 
+def photons(gpu: Gpu) -> None:
+    """Photons a second, those of all channels together, against what the reference is meant to reach."""
+    slab = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
+    skin = Layer((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
+    for name, layer, number, goal in (("van de Hulst's slab", slab, 1_000_000, 3e6), ("Skin1", skin, 300_000, 0.4e6)):
+        figure = measure(lambda layer=layer, number=number: trace([layer], number, gpu=gpu), 7)  # type: ignore[misc]
+        rate = 3 * number / figure.median
+        say(f"3 x {number:,} photons through {name}", figure)
+        print(f"{'  a second':46}{rate / 1e6:9.2f} M   {rate / goal:.2f} of {goal / 1e6:g} M")
+
+
 if __name__ == "__main__":
     device = default_gpu()
     print(f"{device.name}; {os.cpu_count()} cores\n")
     commands()
     encoding(device)
     methods(device)
+    photons(device)

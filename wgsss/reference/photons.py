@@ -78,7 +78,7 @@ class Photons(Profile):
         return self.total + self.total_transmittance + self.absorbed
 
     def reflectance(self, r: ArrayLike) -> Array:
-        """R(r) in 1/mm^2, (..., 3), at `r` (...) mm: linear in log r between the rings' means.
+        """R(r) in 1/mm^2, (..., 3), at `r` (...) mm, between the means of rings.
 
         What left beyond the last ring is taken to fall as 1/r^3, as it does where nothing absorbs.
         """
@@ -91,9 +91,11 @@ class Photons(Profile):
     def _between(self, means: Array, outside: Array, r: ArrayLike) -> Array:
         r = distances(r)
         squares = np.square(self.edges)
-        middle = 0.5 * np.log(0.5 * (squares[1:] + squares[:-1]))
-        log_r = np.log(np.maximum(r, 0.1 * self.edges[1]))
-        near = np.stack([np.interp(log_r, middle, means[:, c]) for c in range(3)], axis=-1)
+        middle = 0.5 * (squares[1:] + squares[:-1])
+        square = np.maximum(np.square(r), middle[0])
+        # Of R r^2, what a step in log r holds, since R itself is steep.
+        steps = [np.interp(np.log(square), np.log(middle), means[:, c] * middle) for c in range(3)]
+        near = np.stack(steps, axis=-1) / square[..., None]
         last = self.edges[-1]
         far = outside * last / (2.0 * np.pi * np.maximum(r, last)[..., None] ** 3)
         return np.where(r[..., None] < last, near, far)

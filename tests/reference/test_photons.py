@@ -1,0 +1,265 @@
+"""Photons in flat layers against exact results of transport, and what the result says of itself."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from wgsss.errors import InputError
+from wgsss.optics import Dipole, Layer, Profile
+from wgsss.reference.photons import Photons, trace
+
+SLAB = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
+SKIN = Layer((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
+
+
+@pytest.fixture(scope="module")
+def slab(gpu) -> Photons:
+    return trace([SLAB], 300_000, gpu=gpu)
+
+
+@pytest.fixture(scope="module")
+def skin(gpu) -> Photons:
+    return trace([SKIN], 100_000, gpu=gpu)
+
+
+def within(found, error, wanted, errors=3.0, least=0.0):
+    """Whether what was found is as near to what is wanted as its standard error says, rounding of `least` apart."""
+    assert np.all(error < 0.03 * np.abs(found) + 1e-9), "too few photons to tell"
+    np.testing.assert_array_less(np.abs(found - wanted), errors * error + least)
+
+
+def chandrasekhar(albedo: float) -> float:
+    """Reflectance of a matched half space that scatters isotropically: 1 - H(1) sqrt(1 - albedo)."""
+    x, w = np.polynomial.legendre.leggauss(200)
+    mu, w = 0.5 * (x + 1), 0.25 * albedo * w
+    H = np.ones(200)
+    kernel = w * mu / (mu[:, None] + mu)
+    for _ in range(400):
+        H = 0.5 * (H + 1 / (np.sqrt(1 - albedo) + kernel @ H))
+    return 1 - np.sqrt(1 - albedo) / (np.sqrt(1 - albedo) + np.sum(w * mu / (1 + mu) * H))
+
+
+def test_slab_of_van_de_hulst(slab):
+    """Wang, Jacques and Zheng 1995, table 1: R 0.09739 and T 0.66096."""
+    within(slab.total, slab.total_error, 0.09739, least=5e-6)
+    within(slab.total_transmittance, slab.total_transmittance_error, 0.66096, least=5e-6)
+
+
+def test_half_space_of_giovanelli(gpu):
+    """Wang, Jacques and Zheng 1995, table 2: 0.2600 with what the surface reflects at once."""
+    photons = trace([Layer((1, 1, 1), (9, 9, 9), 1.5)], 100_000, gpu=gpu)
+    inside = 1 - photons.specular
+    within(photons.specular + inside * photons.total, inside * photons.total_error, 0.2600, least=5e-5)
+
+
+def test_gap_above_a_half_space_is_air(gpu):
+    """A layer of air that does next to nothing: now photons meet the half space's surface from above."""
+    gap = Layer((0, 0, 0), (1e-6, 1e-6, 1e-6), 1.0, thickness=0.5)
+    photons = trace([gap, Layer((1, 1, 1), (9, 9, 9), 1.5)], 100_000, gpu=gpu)
+    assert photons.specular == 0
+    within(photons.total, photons.total_error, 0.2600, least=5e-5)
+    bounced = 0.04  # at the boundary, straight back
+    within(photons.R[0] * photons.areas[0], photons.R_error[0] * photons.areas[0], bounced)
+
+
+@pytest.mark.parametrize("albedo", [(0.3, 0.6, 0.9), (0.99, 0.9999, 0.99999)])
+def test_half_spaces_of_chandrasekhar(gpu, albedo):
+    """The last two are clear enough for leaps."""
+    sigma_t = np.array([1.0, 2.0, 5.0])
+    photons = trace([Layer(sigma_t * (1 - np.array(albedo)), sigma_t * albedo, 1.0)], 100_000, gpu=gpu)
+    within(photons.total, photons.total_error, [chandrasekhar(a) for a in albedo])
+
+
+def test_light_far_away_where_nothing_absorbs(gpu):
+    """What diffuses there came from a depth of H(1) / sqrt(3) mean free paths, beyond the extrapolated boundary."""
+    photons = trace([Layer((0, 0, 0), (1, 2, 5), 1.0)], 50_000, gpu=gpu)
+    np.testing.assert_allclose(photons.total, 1, rtol=1e-12)
+    small = 1e-8
+    depth = (1 - chandrasekhar(1 - small)) / np.sqrt(small) / np.sqrt(3)
+    for paths in (30, 100):
+        beyond = photons.beyond(paths / np.array([1, 2, 5])).diagonal()
+        assert beyond.mean() == pytest.approx(depth / paths, abs=3 * np.sqrt(depth / paths / 150_000))
+
+
+@pytest.mark.parametrize("side", ["R", "T"])
+def test_single_scattering_by_distance(gpu, side):
+    """Scattered once at a depth z, isotropically, and out: an integral over z."""
+    albedo, sigma_t, thickness = 0.01, 2.0, 0.6
+    photons = trace(
+        [Layer(sigma_t * (1 - albedo) * np.ones(3), sigma_t * albedo * np.ones(3), 1.0, thickness)], 400_000, gpu=gpu
+    )
+
+    def ring(z, inner, outer):  # out of the slab between two radii
+        height = z if side == "R" else thickness - z
+
+        def through(r):
+            d = np.hypot(r, height)
+            return r * np.exp(-sigma_t * (z + d)) * height / (2 * d**3)
+
+        return albedo * sigma_t * quad(through, inner, outer)[0]
+
+    means = getattr(photons, side).mean(axis=1) * photons.areas[:, 0]
+    errors = np.sqrt(np.mean(np.square(getattr(photons, f"{side}_error")), axis=1) / 3) * photons.areas[:, 0]
+    edges = [np.searchsorted(photons.edges, r) for r in (0.01, 0.03, 0.1, 0.3, 1.0)]
+    for first, last in pairwise(edges):
+        wanted = quad(ring, 0, thickness, args=(photons.edges[first], photons.edges[last]))[0]
+        error = np.sqrt(np.sum(np.square(errors[first:last])))
+        assert error < 0.05 * wanted
+        assert abs(means[first:last].sum() - wanted) < 3 * error + 0.015 * wanted  # scattered twice is 0.01 as much
+
+
+def test_clear_layers_absorb_by_beer_and_reflect_by_fresnel(gpu):
+    """Straight down through two layers of different index and up again, any number of times."""
+    eta, sigma_a, thickness = (1.0, 1.4, 1.9, 1.2), (0.5, 0.3), (0.4, 0.9)
+    layers = [
+        Layer((s, s, s), (1e-6, 1e-6, 1e-6), n, thickness=t)
+        for n, s, t in zip(eta[1:3], sigma_a, thickness, strict=True)
+    ]
+    photons = trace(layers, 100_000, eta_below=eta[3], gpu=gpu)
+    top, middle, bottom = (((b - a) / (b + a)) ** 2 for a, b in pairwise(eta))
+    first, second = np.exp(-np.multiply(sigma_a, thickness))
+    # Light within the layers, just below and above each boundary: down1 = 1 + top up1, ...
+    system = np.array(
+        [
+            [1, -top, 0, 0],
+            [-middle * first**2, 1, 0, -(1 - middle) * first * second],
+            [-(1 - middle) * first, 0, 1, -middle * second],
+            [0, 0, -bottom * second, 1],
+        ]
+    )
+    down1, up1, down2, up2 = np.linalg.solve(system, [1, 0, 0, 0])
+    assert down1 - up1 * top == pytest.approx(1)
+    assert up2 == pytest.approx(bottom * second * down2)
+    within(photons.total, photons.total_error, (1 - top) * up1)
+    within(photons.total_transmittance, photons.total_transmittance_error, (1 - bottom) * second * down2)
+    assert photons.specular == pytest.approx(top)
+    np.testing.assert_allclose(photons.T[0] * photons.areas[0], photons.total_transmittance, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("eta", "specular"), [(1.0, 0.0), (1.3, 0.0170), (1.5, 0.04)])
+def test_specular_reflection(gpu, eta, specular):
+    assert trace([Layer((9, 9, 9), (1, 1, 1), eta)], 1, gpu=gpu).specular == pytest.approx(specular, abs=5e-5)
+
+
+def test_energy_closes(slab, skin):
+    for photons in (slab, skin):
+        np.testing.assert_allclose(photons.balance, 1, rtol=0, atol=1e-5)
+    assert np.all(skin.total_transmittance == 0)
+
+
+def test_results_are_reproducible(gpu, monkeypatch):
+    first = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
+    monkeypatch.setattr(gpu, "is_cpu", not gpu.is_cpu)  # another number of lanes, hence another order of events
+    again = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
+    other = trace([SLAB, SLAB], 3_000, seed=8, gpu=gpu)
+    for name in ("R", "T", "R_error", "total_error", "absorbed"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
+        assert np.any(getattr(first, name) != getattr(other, name))
+
+
+def test_errors_are_those_of_repetition(gpu):
+    runs = [trace([SLAB], 5_000, seed=seed, gpu=gpu) for seed in range(40)]
+    for name in ("total", "total_transmittance"):
+        found = np.array([getattr(run, name) for run in runs])
+        errors = np.array([getattr(run, f"{name}_error") for run in runs])
+        assert found.std() == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.2)  # of 120: 6.5 % is one error
+    rings = slice(60, 160)
+    found = np.array([run.R[rings].mean(axis=1) for run in runs])
+    errors = np.array([np.sqrt(np.sum(np.square(run.R_error[rings]), axis=1)) / 3 for run in runs])
+    assert found.var(axis=0, ddof=1).sum() == pytest.approx(np.square(errors).mean(axis=0).sum(), rel=0.25)
+    assert np.all(np.isinf(trace([SLAB], 1, gpu=gpu).total_error))
+
+
+def test_a_layer_cut_in_two_is_one_layer(gpu, slab):
+    cut = [Layer(SLAB.sigma_a, SLAB.sigma_s_prime, 1.0, thickness=t, g=SLAB.g) for t in (0.07, 0.13)]
+    photons = trace(cut, 100_000, seed=1, gpu=gpu)
+    for name in ("total", "total_transmittance"):
+        error = np.hypot(getattr(photons, f"{name}_error"), getattr(slab, f"{name}_error"))
+        within(getattr(photons, name), error, getattr(slab, name))
+
+
+def test_permuted_channels_permute_results(gpu, skin):
+    turned = trace([Layer(SKIN.sigma_a[[2, 0, 1]], SKIN.sigma_s_prime[[2, 0, 1]], SKIN.eta)], 100_000, gpu=gpu)
+    error = np.hypot(turned.total_error, skin.total_error[[2, 0, 1]])
+    within(turned.total, error, skin.total[[2, 0, 1]])
+    np.testing.assert_allclose(turned.range(0.1), skin.range(0.1)[[2, 0, 1]], rtol=0.05)
+
+
+def test_halving_lengths_scales_reflectance_by_four(gpu):
+    whole = trace([SLAB, SKIN], 2_000, gpu=gpu)
+    half = trace(
+        [
+            Layer(2 * layer.sigma_a, 2 * layer.sigma_s_prime, layer.eta, layer.thickness / 2, layer.g)
+            for layer in (SLAB, SKIN)
+        ],
+        2_000,
+        gpu=gpu,
+    )
+    np.testing.assert_array_equal(2 * half.edges, whole.edges)
+    np.testing.assert_allclose(half.R, 4 * whole.R, rtol=1e-12)
+    np.testing.assert_array_equal(half.absorbed, whole.absorbed)
+
+
+def test_channels_have_their_own_random_numbers(slab):
+    assert len(set(slab.total)) == 3
+
+
+@pytest.fixture
+def made(skin) -> tuple[Photons, Dipole]:
+    """What photons would count if they were a dipole's, with a share outside of the last ring, and the dipole."""
+    dipole = Dipole((0, 0.001, 0.03), (1, 2, 3), 1.3)
+    edges = skin.edges[skin.edges < 60]
+    share = dipole.total * (dipole.beyond(edges[:-1]) - dipole.beyond(edges[1:]))
+    R = share / (np.pi * np.diff(np.square(edges))[:, None])
+    none, zero = np.zeros_like(R), np.zeros(3)
+    outside = dipole.total * dipole.beyond(edges[-1])
+    return Photons(edges, R, none, 2 * R, none, outside, 2 * outside, zero, zero, zero, 0.0, 1), dipole
+
+
+def test_counts_are_read_as_a_profile(made):
+    photons, dipole = made
+    np.testing.assert_allclose(photons.total, dipole.total, rtol=1e-9)
+    np.testing.assert_allclose(photons.total_transmittance, 2 * dipole.total, rtol=1e-9)
+    r = np.geomspace(0.02, 40, 60)
+    most = dipole.beyond(r) > 0.01
+    np.testing.assert_allclose(photons.reflectance(r)[most], dipole.reflectance(r)[most], rtol=5e-3)
+    np.testing.assert_allclose(photons.transmittance(r)[most], 2 * dipole.reflectance(r)[most], rtol=5e-3)
+    np.testing.assert_allclose(photons.beyond(r)[most], dipole.beyond(r)[most], rtol=5e-3)
+    np.testing.assert_allclose(photons.line_spread(-r)[most], dipole.line_spread(r)[most], rtol=5e-3)
+    np.testing.assert_allclose(photons.range(0.02), dipole.range(0.02), rtol=3e-3)
+    far = np.array([80.0, 500.0])  # without absorption light falls as 1/r^3
+    for name in ("reflectance", "beyond", "line_spread"):
+        np.testing.assert_allclose(getattr(photons, name)(far)[:, 0], getattr(dipole, name)(far)[:, 0], rtol=0.02)
+    for r in (0.0, photons.edges[-1], 1e9):
+        for found in (photons.reflectance(r), photons.beyond(r), photons.line_spread(r), photons.transmittance(r)):
+            assert np.all(np.isfinite(found)) and np.all(found >= 0)
+
+
+def test_counts_are_exact_at_edges(skin):
+    beyond = skin.beyond(skin.edges)
+    np.testing.assert_allclose(beyond[0], 1, rtol=1e-14)
+    np.testing.assert_allclose(beyond[:-1] - beyond[1:], skin.R * skin.areas / skin.total, atol=1e-12)
+    half = np.sqrt(0.5 * (skin.edges[100] ** 2 + skin.edges[101] ** 2))  # half of the ring's area
+    np.testing.assert_allclose(skin.beyond(half), 0.5 * (beyond[100] + beyond[101]), rtol=1e-12)
+    x = np.concatenate([[0.0], np.geomspace(1e-4, 60, 2000)])
+    np.testing.assert_allclose(2 * np.trapezoid(skin.line_spread(x), x, axis=0), skin.total, rtol=2e-3)
+    np.testing.assert_allclose(Profile.beyond(skin, 0.5), skin.beyond(0.5), rtol=0.01)
+
+
+def test_bad_input_is_told(gpu):
+    for arguments, says in (
+        ({"photons": 0}, "photons must be a whole number from 1"),
+        ({"photons": 1.5}, "photons must be a whole number"),
+        ({"photons": 2**31}, "photons must be a whole number"),
+        ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
+        ({"eta_below": 0.9}, "eta_below must be a number of at least 1"),
+        ({"eta_below": np.nan}, "eta_below must be a number of at least 1"),
+        ({"layers": []}, "at least one layer"),
+        ({"layers": [SKIN, SLAB, SKIN]}, "layer 1 has no end"),
+    ):
+        with pytest.raises(InputError, match=says):
+            trace(**{"layers": [SKIN], "gpu": gpu, **arguments})
