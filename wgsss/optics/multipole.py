@@ -143,11 +143,9 @@ _ALONG = _Term(sources.flux_along, sources.fluence_pair_along, _mode_along)
 def _images(term: _Term, sigma_tr: float, z: float, H: float, r: Array, reach: float) -> Array:
     """The sum over all i of the flux of a source at `z` + 2 H i, 0 < `z` < 2 H, at `r` (n,) up to `reach`."""
     period = 2.0 * H
-    if z > H:
-        return -_images(term, sigma_tr, period - z, H, r, reach)
     n = _MOST_IMAGES
     if sigma_tr > 0.0:  # fewer where exp(-36) of the light is left at `reach`
-        n = min(n, 2 + math.ceil(math.sqrt((36.0 / sigma_tr) ** 2 + 72.0 * reach / sigma_tr) / period))
+        n = min(n, 3 + math.ceil(math.sqrt((36.0 / sigma_tr) ** 2 + 72.0 * reach / sigma_tr) / period))
     offsets = period * np.arange(1.0, n + 3.0)[:, None]
     weights = np.ones(n + 2)
     weights[-4:] = _END
