@@ -229,7 +229,7 @@ def test_counts_are_read_as_a_profile(made):
     np.testing.assert_allclose(photons.reflectance(r)[most], dipole.reflectance(r)[most], rtol=0.01)
     np.testing.assert_allclose(photons.transmittance(r)[most], 2 * dipole.reflectance(r)[most], rtol=0.01)
     np.testing.assert_allclose(photons.beyond(r)[most], dipole.beyond(r)[most], rtol=0.01)
-    np.testing.assert_allclose(photons.line_spread(-r)[most], dipole.line_spread(r)[most], rtol=0.01)
+    np.testing.assert_allclose(photons.line_spread(-r)[most], dipole.line_spread(r)[most], rtol=0.02)
     np.testing.assert_allclose(photons.range(0.02), dipole.range(0.02), rtol=3e-3)
     far = np.array([80.0, 500.0])  # without absorption light falls as 1/r^3
     for name in ("reflectance", "beyond", "line_spread"):
