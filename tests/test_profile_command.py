@@ -123,7 +123,7 @@ def test_bad_input_is_one_line(argv, says, capsys):
         ),
         (
             "[[layers]]\nsigma_a = [1, 1, 1]\nsigma_s_prime = [1, 1, 1]\neta = 0.5",
-            "1: eta must be a number of at least 1",
+            "1: eta must be a number from 1 to 3",
         ),
         ("[[layers]]\nsigma_a = [1, 1, 1]\nsigma_s_prime = [1, 1, 1]\ng = 1", "1: g must be above -1 and below 1"),
         ("[[layers]]\nsigma_a = [1, 1, 1]\nsigma_s_prime = [1, 1, 1]\nthickness = 0.1", "red"),

@@ -178,9 +178,9 @@ def test_channels_are_independent(skin):
         ({"thickness": np.inf}, "thickness must be a finite number"),
         ({"thickness": "3"}, "thickness must be a finite number"),
         ({"thickness": -1.0}, "thickness must be above the mean free path of red"),
-        ({"thickness": 5.0, "eta_below": 0.9}, "eta_below must be a number of at least 1, not 0.9"),
-        ({"thickness": 5.0, "eta_below": np.nan}, "eta_below must be a number of at least 1"),
-        ({"thickness": 5.0, "eta": 0.5}, "eta must be a number of at least 1"),
+        ({"thickness": 5.0, "eta_below": 0.9}, "eta_below must be a number from 1 to 3, not 0.9"),
+        ({"thickness": 5.0, "eta_below": np.nan}, "eta_below must be a number from 1 to 3"),
+        ({"thickness": 5.0, "eta": 0.5}, "eta must be a number from 1 to 3"),
         ({"thickness": 1.36, "eta": 1.5, "eta_below": 1.5}, r"at least 2\.55\d mm in red.* 1.295 mm.* not 1.36"),
     ],
 )

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.optics import hankel
-from wgsss.optics.medium import Layer, stack
+from wgsss.optics.medium import Layer, check_index, stack
 from wgsss.optics.profile import Profile, distances, shares
 from wgsss.optics.slab import (
     SlabSpectra,
     Spectrum,
     check_alone,
-    check_below,
     check_thickness,
     decay,
     extrapolation,
@@ -31,7 +30,7 @@ class Layers(Profile):
     """A stack of layers under air, lit from above (Donner and Jensen 2005; 004 section 2.7.2).
 
     `layers`: from the top down; each finite one thicker than its mean free path in every channel. `eta_below`: index of
-    what lies below a last layer of finite thickness, relative to air, at least 1. Raises InputError for anything else,
+    what lies below a last layer of finite thickness, relative to air, 1 to 3. Raises InputError for anything else,
     naming the layer, the channel and its mean free path.
 
     Each layer's R and T, between its neighbours' indices, as of `Multipole` (a `Dipole` where it has no end), are
@@ -48,7 +47,7 @@ class Layers(Profile):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "layers", stack(self.layers))
-        check_below(self.eta_below)
+        check_index("eta_below", self.eta_below)
         for number, layer in enumerate(self.layers, start=1):
             check_thickness(layer, layer.thickness, f"thickness of layer {number}")
         if len(self.layers) == 1:

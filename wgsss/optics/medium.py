@@ -21,7 +21,7 @@ class Medium:
     """Coefficients of a homogeneous medium.
 
     `sigma_a`: absorption (3,) in 1/mm, at least 0. `sigma_s_prime`: reduced scattering (3,) in 1/mm, above 0.
-    `eta`: refractive index relative to air, at least 1. Raises InputError, naming the channel, for anything else.
+    `eta`: refractive index relative to air, 1 to 3. Raises InputError, naming the channel, for anything else.
     """
 
     sigma_a: Array
@@ -31,8 +31,7 @@ class Medium:
     def __post_init__(self) -> None:
         for name, low, above in (("sigma_a", 0.0, False), ("sigma_s_prime", 0.0, True)):
             object.__setattr__(self, name, coefficients(name, getattr(self, name), low, above, "1/mm"))
-        if not (isinstance(self.eta, int | float | np.number) and 1.0 <= self.eta < math.inf):
-            raise InputError(f"eta must be a number of at least 1, not {self.eta}")
+        check_index("eta", self.eta)
 
     @property
     def sigma_t_prime(self) -> Array:
@@ -94,10 +93,19 @@ def stack(layers: Sequence[Layer]) -> tuple[Layer, ...]:
     """A stack from the top down. Raises InputError if it is empty, or goes on below a layer without end."""
     if not layers:
         raise InputError("a stack needs at least one layer")
+    for number, layer in enumerate(layers, start=1):
+        if not isinstance(layer, Layer):
+            raise InputError(f"layer {number} must be a Layer, not {layer!r}")
     for number, layer in enumerate(layers[:-1], start=1):
         if math.isinf(layer.thickness):
             raise InputError(f"layer {number} has no end: there cannot be a layer {number + 1} below it")
     return tuple(layers)
+
+
+def check_index(name: str, eta: object) -> None:
+    """Raises InputError unless a refractive index relative to air is one that the polynomials of `fresnel` cover."""
+    if not (isinstance(eta, int | float | np.number) and 1.0 <= float(eta) <= 3.0):
+        raise InputError(f"{name} must be a number from 1 to 3, not {eta}")
 
 
 def coefficients(

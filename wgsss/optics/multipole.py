@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
 from wgsss.optics import sources
-from wgsss.optics.medium import Medium
+from wgsss.optics.medium import Medium, check_index
 from wgsss.optics.profile import Profile, distances, shares
-from wgsss.optics.slab import Spectrum, check_alone, check_below, check_thickness, extrapolation, slab_spectra
+from wgsss.optics.slab import Spectrum, check_alone, check_thickness, extrapolation, slab_spectra
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Multipole(Medium, Profile):
     """A slab under air, lit from above: what leaves at its top and at its bottom (004 eq. 31, 32; Contini et al. 1997).
 
     `thickness`: mm, finite and above the mean free path in every channel, as the real source lies that deep.
-    `eta_below`: index of what lies below, relative to air, at least 1. Where it is near the slab's, whose bottom then
+    `eta_below`: index of what lies below, relative to air, 1 to 3. Where it is near the slab's, whose bottom then
     reflects little, the slab must be up to two mean free paths thick. Raises InputError, naming the channel and its
     mean free path, for slabs that are thinner: their R or T would be negative somewhere.
 
@@ -46,7 +46,7 @@ class Multipole(Medium, Profile):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_below(self.eta_below)
+        check_index("eta_below", self.eta_below)
         if not (isinstance(self.thickness, int | float | np.number) and self.thickness < math.inf):
             raise InputError(f"thickness must be a finite number (mm), not {self.thickness}")
         check_thickness(self, self.thickness, "thickness")

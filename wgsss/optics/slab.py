@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,9 +81,3 @@ def check_alone(medium: Medium, thickness: float, eta_below: float) -> None:
                 f"thickness must be at least {least:.4g} mm in {channel}, of mean free path {length:.4g} mm, over an "
                 f"index of {eta_below:g}, or R would be negative far out, not {thickness:g}"
             )
-
-
-def check_below(eta: float) -> None:
-    """Raises InputError unless the index of what lies below is a number of at least 1."""
-    if not (isinstance(eta, int | float | np.number) and 1.0 <= eta < math.inf):
-        raise InputError(f"eta_below must be a number of at least 1, not {eta}")
