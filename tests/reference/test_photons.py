@@ -145,7 +145,7 @@ def test_light_far_away_where_nothing_absorbs(gpu):
         assert beyond.mean() == pytest.approx(depth / paths, abs=3 * np.sqrt(depth / paths / 150_000))
 
 
-def test_leaps_keep_their_direction(gpu):
+def test_leaps_through_a_thick_slab(gpu):
     """Through a slab that absorbs nothing goes the depth above over the slab's, between extrapolated boundaries."""
     small, thickness = 1e-8, 56.0
     depth = (1 - half_space(1 - small)) / np.sqrt(small) / np.sqrt(3)
