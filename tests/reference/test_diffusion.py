@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.optics import BetterDipole, Dipole, Layer, Layers, Multipole, Profile
-from wgsss.reference.photons import Photons, trace
+from wgsss.optics import BetterDipole, Dipole, Layer, Layers, Multipole, Photons, Profile
+from wgsss.reference.photons import trace
 
 SKIN1 = ((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
 # 004 table 3, after Donner and Jensen 2006

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 from wgsss.errors import InputError
-from wgsss.optics import Dipole, Layer, Profile
-from wgsss.reference.photons import Photons, trace
+from wgsss.optics import Dipole, Layer, Photons, Profile
+from wgsss.reference.photons import trace
 
 SLAB = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
 SKIN = Layer((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
@@ -326,8 +326,8 @@ def test_bad_input_is_told(gpu):
         ({"photons": 1.5}, "photons must be a whole number"),
         ({"photons": 2**31}, "photons must be a whole number"),
         ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
-        ({"eta_below": 0.9}, "eta_below must be a number of at least 1"),
-        ({"eta_below": np.nan}, "eta_below must be a number of at least 1"),
+        ({"eta_below": 0.9}, "eta_below must be a number from 1 to 3"),
+        ({"eta_below": np.nan}, "eta_below must be a number from 1 to 3"),
         ({"layers": []}, "at least one layer"),
         ({"layers": [SKIN, SLAB, SKIN]}, "layer 1 has no end"),
     ):

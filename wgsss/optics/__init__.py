@@ -11,6 +11,7 @@ from wgsss.optics.gaussians import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.layers import Layers
 from wgsss.optics.medium import Layer, Medium
 from wgsss.optics.multipole import Multipole
+from wgsss.optics.photons import Photons
 from wgsss.optics.profile import Profile
 from wgsss.optics.tabulated import Tabulated
 from wgsss.optics.thin import blend
@@ -25,6 +26,7 @@ __all__ = [
     "Medium",
     "Multipole",
     "NormalizedDiffusion",
+    "Photons",
     "Profile",
     "SumOfGaussians",
     "Tabulated",

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wgsss import wgsl
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
-from wgsss.optics.medium import Layer, stack
-from wgsss.optics.profile import Profile, distances, shares
+from wgsss.optics import Layer, Photons
+from wgsss.optics.medium import check_index, stack
 
 Array = NDArray[np.float64]
 
@@ -27,96 +25,6 @@ _CLEAR = 1e-4  # share of sigma_t' that may be absorption where photons leap
 _BATCH = 1024  # photons at most, so that tallies do not overflow
 _BATCHES = 64  # at least, where there are so many photons, for an error to be told from their spread
 _ROUND = 8192  # batches tallied before they are read: 24 MiB
-
-
-@dataclass(frozen=True, eq=False)
-class Photons(Profile):
-    """What became of photons that entered a stack of layers at one point, at a right angle.
-
-    Everything but `specular` is per unit of flux that entered, as diffusion has it, and per RGB channel. Errors are
-    standard errors, from the spread over batches of photons; infinite for a single photon.
-
-    `edges`: radii (n + 1,) in mm of the rings about the point that light is counted in, from 0.
-    `R`, `T`: mean exitance (n, 3) of each ring in 1/mm^2, on the side of entry and on the far side.
-    `R_error`, `T_error`: their errors (n, 3).
-    `R_outside`, `T_outside`: shares (3,) that left beyond the last ring.
-    `total_error`, `total_transmittance_error`: errors (3,) of `total` and `total_transmittance`.
-    `absorbed`: share (3,) that stayed inside.
-    `specular`: share of the incident light that the top reflects without letting it in.
-    `photons`: how many were followed in each channel.
-    """
-
-    edges: Array
-    R: Array
-    R_error: Array
-    T: Array
-    T_error: Array
-    R_outside: Array
-    T_outside: Array
-    total_error: Array
-    total_transmittance_error: Array
-    absorbed: Array
-    specular: float
-    photons: int
-
-    @cached_property
-    def areas(self) -> Array:
-        """Area (n, 1) of each ring in mm^2."""
-        return np.pi * np.diff(np.square(self.edges))[:, None]
-
-    @property
-    def total(self) -> Array:
-        return (self.R * self.areas).sum(axis=0) + self.R_outside
-
-    @property
-    def total_transmittance(self) -> Array:
-        return (self.T * self.areas).sum(axis=0) + self.T_outside
-
-    @property
-    def balance(self) -> Array:
-        """Reflected, transmitted and absorbed (3,) together: 1, but for the roulette that ends faint photons."""
-        return self.total + self.total_transmittance + self.absorbed
-
-    def reflectance(self, r: ArrayLike) -> Array:
-        """R(r) in 1/mm^2, (..., 3), at `r` (...) mm, between the means of rings.
-
-        What left beyond the last ring is taken to fall as 1/r^3, as it does where nothing absorbs.
-        """
-        return self._between(self.R, self.R_outside, r)
-
-    def transmittance(self, r: ArrayLike) -> Array:
-        """T(r) in 1/mm^2, (..., 3), as `reflectance`."""
-        return self._between(self.T, self.T_outside, r)
-
-    def _between(self, means: Array, outside: Array, r: ArrayLike) -> Array:
-        r = distances(r)
-        squares = np.square(self.edges)
-        middle = 0.5 * (squares[1:] + squares[:-1])
-        square = np.maximum(np.square(r), middle[0])
-        # Of R r^2, what a step in log r holds, since R itself is steep.
-        steps = [np.interp(np.log(square), np.log(middle), means[:, c] * middle) for c in range(3)]
-        near = np.stack(steps, axis=-1) / square[..., None]
-        last = self.edges[-1]
-        far = outside * last / (2.0 * np.pi * np.maximum(r, last)[..., None] ** 3)
-        return np.where(r[..., None] < last, near, far)
-
-    def beyond(self, r: ArrayLike) -> Array:
-        """Share (..., 3) of the total that leaves farther than `r` (...) mm away: exact at edges, even within rings."""
-        r = distances(r)
-        rings = np.vstack([self.R * self.areas, self.R_outside])
-        beyond_edge = np.cumsum(rings[::-1], axis=0)[::-1]
-        squares = np.square(self.edges)
-        found = np.stack([np.interp(np.square(r), squares, beyond_edge[:, c]) for c in range(3)], axis=-1)
-        found *= (self.edges[-1] / np.maximum(r, self.edges[-1]))[..., None]
-        return shares(found, self.total)
-
-    def line_spread(self, x: ArrayLike) -> Array:
-        """R integrated along a line at |x| (...) mm: (..., 3) in 1/mm, exact for the rings by their chords."""
-        x = distances(np.abs(np.asarray(x, dtype=np.float64)))[..., None]
-        half = np.sqrt(np.maximum(np.square(self.edges) - np.square(x), 0.0))
-        last = self.edges[-1]
-        far = np.square(last / np.maximum(x, last)) / (np.pi * (last + half[..., -1:]))  # the integral of 1/r^3
-        return 2.0 * np.diff(half, axis=-1) @ self.R + far * self.R_outside
 
 
 def trace(
@@ -150,8 +58,7 @@ def trace(
         raise InputError(f"photons must be a whole number from 1 to {2**31 - 1}, not {photons}")
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"seed must be a whole number of at least 0, not {seed}")
-    if not (isinstance(eta_below, int | float | np.number) and 1.0 <= eta_below < np.inf):
-        raise InputError(f"eta_below must be a number of at least 1, not {eta_below}")
+    check_index("eta_below", eta_below)
     shortest = 1.0 / max(layer.sigma_t_prime.max() for layer in layers)
     innermost = int(np.float32((_NEAREST * shortest) ** 2).view(np.uint32) >> 20)
     with tqdm(total=3 * photons, desc=label, unit=" photons", unit_scale=True, file=sys.stderr, disable=None) as bar:
