@@ -36,14 +36,13 @@ def flux_along(sigma_tr: Array, z: Array, x: Array) -> Array:
 
 def fluence_pair(sigma_tr: Array, z: Array, z_far: Array, r: Array) -> Array:
     """D phi in the plane at `r` of a source at `z` less one at `z_far`, 1/mm."""
-    d, d_far = np.hypot(r, z), np.hypot(r, z_far)
-    return (np.exp(-sigma_tr * d) / d - np.exp(-sigma_tr * d_far) / d_far) / (4.0 * np.pi)
+    d, d_far, gap = _distances(z, z_far, r)
+    return np.exp(-sigma_tr * d) * (gap / d - np.expm1(-sigma_tr * gap)) / (4.0 * np.pi * d_far)
 
 
 def fluence_pair_beyond(sigma_tr: Array, z: Array, z_far: Array, r: Array) -> Array:
     """The integral of `fluence_pair` over the plane outside of a circle of radius `r`, mm."""
-    d, d_far = np.hypot(r, z), np.hypot(r, z_far)
-    gap = (np.square(z_far) - np.square(z)) / (d_far + d)  # d_far - d, without cancellation
+    d, _, gap = _distances(z, z_far, r)
     sigma = np.maximum(sigma_tr, 1e-12)
     return -0.5 * np.exp(-sigma * d) * np.expm1(-sigma * gap) / sigma
 
@@ -55,3 +54,9 @@ def fluence_pair_along(sigma_tr: Array, z: Array, z_far: Array, x: Array) -> Arr
     near, far = np.hypot(x, z), np.hypot(x, z_far)
     sigma = np.maximum(sigma_tr, 1e-9 / far)  # K0 is then a logarithm, whose large part cancels
     return (k0(sigma * near) - k0(sigma * far)) / (2.0 * np.pi)
+
+
+def _distances(z: Array, z_far: Array, r: Array) -> tuple[Array, Array, Array]:
+    """Distances of two sources, and their difference without cancellation."""
+    d, d_far = np.hypot(r, z), np.hypot(r, z_far)
+    return d, d_far, (np.square(z_far) - np.square(z)) / (d_far + d)
