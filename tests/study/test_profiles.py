@@ -89,12 +89,24 @@ def test_photons_are_one_of_the_models():
     ("case", "models", "says"),
     [
         (Case(SKIN1), ["dipol"], "unknown model 'dipol'; did you mean 'dipole'"),
-        (Case(SKIN1), ["multipole"], "'multipole' needs a thickness"),
-        (Case(SKIN1), ["table"], "'skin1' has no table"),
-        (Case(MATERIALS["skin"]), ["dipole"], "'skin' has no sigma_a and sigma_s_prime"),
-        (Case(MATERIALS["skin"]), ["photons"], "'skin' has no sigma_a and sigma_s_prime"),
-        (Case(LAYERED), ["better-dipole"], "'two' has no sigma_a and sigma_s_prime"),
-        (Case(SKIN1, thickness=1.0), ["multipole"], "red.*1.295"),
+        (Case(SKIN1), ["multipole"], "'skin1' by the model 'multipole': a thickness is needed"),
+        (Case(SKIN1), ["table"], "'skin1' by the model 'table': the material has no table"),
+        (
+            Case(MATERIALS["skin"]),
+            ["dipole"],
+            "'skin' by the model '.*': the material has no sigma_a and sigma_s_prime",
+        ),
+        (
+            Case(MATERIALS["skin"]),
+            ["photons"],
+            "'skin' by the model '.*': the material has no sigma_a and sigma_s_prime",
+        ),
+        (
+            Case(LAYERED),
+            ["better-dipole"],
+            "'two' by the model 'better-dipole': the material has no sigma_a and sigma_s_prime",
+        ),
+        (Case(SKIN1, thickness=1.0), ["multipole"], "'skin1' by the model 'multipole': .*red.*1.295"),
     ],
 )
 def test_what_a_model_cannot_serve_is_told(case, models, says):
@@ -105,7 +117,7 @@ def test_what_a_model_cannot_serve_is_told(case, models, says):
 
 def test_a_thickness_is_for_coefficients():
     for material in (LAYERED, MATERIALS["skin"], ONE_TABLE):
-        with pytest.raises(InputError, match=f"'{material.name}': a thickness needs"):
+        with pytest.raises(InputError, match=f"'{material.name}': a thickness is for"):
             Case(material, thickness=3.0)
 
 

@@ -73,8 +73,8 @@ class Material:
         given = [name for name in IN_PLACE if getattr(self, name) is not None]
         if len(given) > 1 or (given and (self.sigma_a is not None or self.sigma_s_prime is not None)):
             raise InputError(f"{given[0]} stand in place of sigma_a and sigma_s_prime: give one or the other")
-        checks.number(self, "eta", 1, 3)
         try:
+            checks.number(self, "eta", 1, 3)
             self._check_medium()
         except InputError as error:
             raise InputError(f"material '{self.name}': {error}") from None

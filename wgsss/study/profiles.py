@@ -45,7 +45,7 @@ class Case:
 
     def __post_init__(self) -> None:
         if self.thickness is not None and self.material.sigma_a is None:
-            raise InputError(f"material '{self.material.name}': a thickness needs sigma_a and sigma_s_prime")
+            raise InputError(f"material '{self.material.name}': a thickness is for sigma_a and sigma_s_prime")
 
     @cached_property
     def stack(self) -> tuple[Layer, ...]:
@@ -69,12 +69,12 @@ class Case:
         return Dipole(self.medium.sigma_a, self.medium.sigma_s_prime, self.medium.eta)
 
     def _lacks(self, what: str) -> InputError:
-        return InputError(f"material '{self.material.name}' has no {what}, which this model needs")
+        return InputError(f"the material has no {what}")
 
 
 def _multipole(case: Case) -> Profile:
     if case.thickness is None:
-        raise InputError("the model 'multipole' needs a thickness")
+        raise InputError("a thickness is needed")
     return Multipole(case.medium.sigma_a, case.medium.sigma_s_prime, case.medium.eta, thickness=case.thickness)
 
 
@@ -84,7 +84,7 @@ def _gaussians(case: Case) -> Profile:
 
 def _table(case: Case) -> Profile:
     if case.material.table is None:
-        raise InputError(f"material '{case.material.name}' has no table")
+        raise InputError("the material has no table")
     return case.material.table
 
 
@@ -142,7 +142,13 @@ def profiles(case: Case, models: Sequence[str]) -> dict[str, Profile]:
     for name in models:
         if name not in MODELS:
             raise unknown("model", name, MODELS)
-    return {name: MODELS[name][0](case) for name in models}
+    found = {}
+    for name in models:
+        try:
+            found[name] = MODELS[name][0](case)
+        except InputError as error:
+            raise InputError(f"material '{case.material.name}' by the model '{name}': {error}") from None
+    return found
 
 
 def distances_for(found: dict[str, Profile], n: int = SAMPLES) -> Array:
