@@ -259,8 +259,8 @@ def test_texels_vertices_and_pixels_agree(gpu):
     surface = body.unwrap()
     graph = Graph(gpu)
     frame = shared.begin(graph, stage, (256, 256))
-    pixels, texels, vertices = (shared.irradiance_pixels(frame), shared.irradiance_texels(frame, body, 400),
-                                shared.irradiance_vertices(frame, body))  # fmt: skip
+    pixels, texels = shared.irradiance_pixels(frame), shared.irradiance_texels(frame, body, 400)
+    vertices = shared.irradiance_points(frame, body, body.vertices, len(body.layout.vertex))
     graph.run(pixels, texels, vertices, frame.gbuffer.where_seen)
     pixels, texels, vertices, seen = (graph.read(h) for h in (pixels, texels, vertices, frame.gbuffer.where_seen))
     texels = texels * frame.lighting.unit

@@ -174,13 +174,19 @@ def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
     )
 
 
-def irradiance_vertices(frame: Frame, body: Body) -> Handle:
-    """L_d, W/m^2, at a body's render vertices: a buffer of vec4f."""
+def irradiance_points(frame: Frame, body: Body, points: Any, count: int) -> Handle:
+    """L_d, W/m^2, at `count` points on a body, times the base colour's share that is applied before diffusion.
+
+    `points`: a buffer of array<Vertex>, such as `body.vertices` or `body.points`. Gives a buffer of vec4f.
+    """
+    maps = vars(body.maps)
     return frame.graph.dispatch(
-        "frame/irradiance_vertices",
-        size=len(body.layout.vertex),
-        vertices=body.vertices,
+        "frame/irradiance_points",
+        size=count,
+        points=points,
         environment=body.environment.irradiance,
+        base_color_map=maps["base_color_map"],
+        specular_map=maps["specular_map"],
         **frame.light_bindings(body),
     )
 

@@ -13,7 +13,7 @@ from wgsss import frame as shared
 from wgsss.errors import InputError, RenderError, unknown
 from wgsss.gpu import LIMITS, Gpu, default_gpu
 from wgsss.graph import Graph, Handle
-from wgsss.methods import METHODS, Method, make_method
+from wgsss.methods import Method, make_method, name_of
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 
@@ -102,7 +102,7 @@ class Renderer:
         scene, method = self.stage.scene, self.method
         return {
             "scene": scene.name,
-            "method": next((name for name, kind in METHODS.items() if kind is type(method)), type(method).__name__),
+            "method": name_of(method),
             "knobs": " ".join(f"{knob}={value}" for knob, value in vars(method).items()),
             "adapter": self.gpu.name,
             "exposure": f"{scene.exposure:g}",

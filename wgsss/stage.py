@@ -11,6 +11,7 @@ import numpy as np
 
 from wgsss import wgsl
 from wgsss.bake.environment import Prefiltered, prefilter
+from wgsss.bake.samples import Samples
 from wgsss.bake.unwrap import Surface, split, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
@@ -107,14 +108,54 @@ class Body:
 
     def _upload(self, mesh: Mesh) -> Any:
         layout = self.layout
-        normals = layout.normals if mesh is self.rest.mesh else mesh.normals[layout.vertex]
         value = {
             "position": mesh.positions[layout.vertex],
             "u": layout.uvs[:, 0],
-            "normal": normals,
+            "normal": self._normals(mesh),
             "v": layout.uvs[:, 1],
             "atlas": layout.atlas,
             "welded": layout.vertex,
+        }
+        return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
+
+    def _normals(self, mesh: Mesh) -> Any:
+        return self.layout.normals if mesh is self.rest.mesh else mesh.normals[self.layout.vertex]
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh as posed, in object space."""
+        return self.stage.scene.objects[self.index].mesh
+
+    def at(self, samples: Samples) -> SimpleNamespace:
+        """Samples of the surface as posed, in object space: position (N, 3) in mm, normal (N, 3) of length 1, uv (N, 2)
+        and area (N,) in mm^2, float32."""
+        mesh, layout = self.mesh, self.layout
+        corners = mesh.positions[layout.vertex][layout.faces].astype(np.float64)
+        area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        triangle = layout.faces[samples.face]
+
+        def between(values: Any) -> Any:
+            return np.einsum("nk,nkd->nd", samples.barycentric, values[triangle])
+
+        normal = between(self._normals(mesh))
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        return SimpleNamespace(
+            position=between(mesh.positions[layout.vertex]).astype(np.float32),
+            normal=normal.astype(np.float32),
+            uv=between(layout.uvs).astype(np.float32),
+            area=(area[samples.face] * samples.share).astype(np.float32),
+        )
+
+    def points(self, samples: Samples) -> Any:
+        """A buffer of array<Vertex> of samples of the surface as posed, for `frame.irradiance_points`."""
+        at = self.at(samples)
+        value = {
+            "position": at.position,
+            "u": at.uv[:, 0],
+            "normal": at.normal,
+            "v": at.uv[:, 1],
+            "atlas": np.zeros_like(at.uv),
+            "welded": np.zeros(len(at.uv), np.uint32),
         }
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
 

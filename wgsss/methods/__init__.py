@@ -14,13 +14,16 @@ METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace}
 
 
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
-    """The method `name` with its knobs set.
+    """The method, or the reference, `name` with its knobs set.
 
     Raises InputError for a name or knob that is not known, or a value that is not of the knob's type and range.
     """
-    if name not in METHODS:
-        raise unknown("method", name, METHODS)
-    kind = METHODS[name]
+    from wgsss.reference import REFERENCES
+
+    kinds = {**METHODS, **REFERENCES}
+    if name not in kinds:
+        raise unknown("method", name, kinds)
+    kind = kinds[name]
     known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
     values = {}
     for knob, value in (knobs or {}).items():
@@ -28,6 +31,13 @@ def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
             raise unknown(f"knob of {name}", knob, known)
         values[knob] = _parsed(f"{name}: {knob}", known[knob], value)
     return kind(**values)
+
+
+def name_of(method: Method) -> str:
+    """The name that a method or a reference goes by."""
+    from wgsss.reference import REFERENCES
+
+    return next((n for n, kind in {**METHODS, **REFERENCES}.items() if kind is type(method)), type(method).__name__)
 
 
 def _parsed(where: str, knob: Any, value: Any) -> Any:
@@ -43,4 +53,4 @@ def _parsed(where: str, knob: Any, value: Any) -> Any:
     return parsed
 
 
-__all__ = ["METHODS", "Diffused", "Method", "make_method"]
+__all__ = ["METHODS", "Diffused", "Method", "make_method", "name_of"]

@@ -1,1 +1,10 @@
 """The truths that methods and models are measured against."""
+
+from __future__ import annotations
+
+from wgsss.reference.estimate import Estimate, Reference
+
+REFERENCES: dict[str, type[Reference]] = {}
+"""those that can be asked for by name where a method can"""
+
+__all__ = ["REFERENCES", "Estimate", "Reference"]

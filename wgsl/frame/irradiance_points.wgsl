@@ -1,11 +1,11 @@
-// L_d at the vertices of one object, without its maps.
+// L_d at points on one object: its vertices, or any others. Normal maps, which need derivatives, are left out.
 
-import package::mesh::{Vertex, Surface};
+import package::mesh::{Vertex, Surface, color_before};
 import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
 
 @group(0) @binding(0) var<uniform> surface: Surface;
-@group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(1) var<storage, read> points: array<Vertex>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 @group(0) @binding(3) var<storage, read> views: array<ShadowView>;
 @group(0) @binding(4) var shadow_maps: texture_depth_2d_array;
@@ -13,16 +13,22 @@ import package::irradiance::{transmitted, transmitted_environment};
 @group(0) @binding(6) var rho_dt_table: texture_2d<f32>;
 @group(0) @binding(7) var environment: texture_2d<f32>;
 @group(0) @binding(8) var linear_wrap_u: sampler;
-@group(0) @binding(9) var<storage, read_write> irradiance: array<vec4f>;
+@group(0) @binding(9) var base_color_map: texture_2d<f32>;
+@group(0) @binding(10) var specular_map: texture_2d<f32>;
+@group(0) @binding(11) var linear_repeat: sampler;
+@group(0) @binding(12) var<storage, read_write> irradiance: array<vec4f>; // L_d times the base colour's share before diffusion
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= arrayLength(&vertices) {
+    if id.x >= arrayLength(&points) {
         return;
     }
-    let vertex = vertices[id.x];
-    let x = (surface.object_to_world * vec4f(vertex.position, 1.0)).xyz;
-    let n = normalize((surface.object_to_world * vec4f(vertex.normal, 0.0)).xyz);
+    let point = points[id.x];
+    let x = (surface.object_to_world * vec4f(point.position, 1.0)).xyz;
+    let n = normalize((surface.object_to_world * vec4f(point.normal, 0.0)).xyz);
+    let uv = vec2f(point.u, point.v);
+    let color = textureSampleLevel(base_color_map, linear_repeat, uv, 0.0).rgb;
+    let specular = surface.specular * textureSampleLevel(specular_map, linear_repeat, uv, 0.0).r;
     var total = transmitted_environment(environment, linear_wrap_u, n);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
@@ -35,7 +41,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
             lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
         }
-        total += transmitted(at, n, surface.specular, lit, rho_dt_table);
+        total += transmitted(at, n, specular, lit, rho_dt_table);
     }
-    irradiance[id.x] = vec4f(total, 1.0);
+    irradiance[id.x] = vec4f(color_before(surface, color) * total, 1.0);
 }
