@@ -36,7 +36,7 @@ class Reference(Method, Protocol):
 
     @abstractmethod
     def estimate(self, stage: Stage, size: tuple[int, int]) -> Estimate:
-        """M of the scene as posed at `size` (width, height) pixels, cached. May take minutes, and shows how far it is."""
+        """M of the scene as posed at `size` (width, height) pixels, cached. May take minutes; shows how far it is."""
 
     def bake(self, stage: Stage) -> None:
         """Nothing."""
