@@ -12,7 +12,7 @@ fn transmitted(at: Incident, n: Direction, specular: Number, lit: Number, rho_dt
     return at.irradiance * (cosine * lit * rho_dt(rho_dt_table, cosine, specular));
 }
 
-// L_d of the environment, unoccluded: prefiltered over normals with the cosine and rho_dt.
-fn transmitted_environment(environment: texture_2d<f32>, linear_wrap_u: sampler, n: Direction) -> Irradiance {
-    return textureSampleLevel(environment, linear_wrap_u, lat_long_of_direction(n), 0.0).rgb;
+// L_d of the environment, of which a share `sky` arrives: prefiltered over normals with the cosine and rho_dt.
+fn transmitted_environment(environment: texture_2d<f32>, linear_wrap_u: sampler, n: Direction, sky: Number) -> Irradiance {
+    return sky * textureSampleLevel(environment, linear_wrap_u, lat_long_of_direction(n), 0.0).rgb;
 }

@@ -9,6 +9,7 @@ struct Vertex {
     v: Number,
     atlas: vec2f,    // unique texture coordinates, for texture-space passes
     welded: u32,     // the vertex of the welded topology
+    sky: Number,     // share of the environment's irradiance that the scene lets through
 }
 
 // What is the same over an object in all passes of a frame.

@@ -12,6 +12,7 @@ import numpy as np
 from wgsss import wgsl
 from wgsss.bake.environment import Prefiltered, prefilter
 from wgsss.bake.samples import Samples
+from wgsss.bake.sky import sky_visibility
 from wgsss.bake.unwrap import Surface, split, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
@@ -100,7 +101,7 @@ class Body:
     def vertices(self) -> Any:
         """A buffer of array<Vertex> (wgsl/mesh.wgsl), as posed."""
         if self.rest.motion is None:
-            key = ("vertices", id(self.rest.mesh), self._unwrapped)
+            key = ("vertices", self.index, self._unwrapped)
             return self.stage.shared(key, lambda: self._upload(self.rest.mesh))
         if self._posed is None or self._posed[0] != self.stage.time_s:
             self._posed = (self.stage.time_s, self._upload(self.stage.scene.objects[self.index].mesh))
@@ -115,8 +116,23 @@ class Body:
             "v": layout.uvs[:, 1],
             "atlas": layout.atlas,
             "welded": layout.vertex,
+            "sky": self.sky,
         }
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
+
+    @property
+    def sky(self) -> Any:
+        """The share of the environment's irradiance (R,) that arrives at the render vertices, at rest."""
+        lights, layout = self.stage.environments(), self.layout
+        if not lights:
+            return np.ones(len(layout.vertex), np.float32)
+
+        def make() -> Any:
+            turn, shift = self.rest.matrix[:3, :3], self.rest.matrix[:3, 3]
+            positions = self.rest.mesh.positions[layout.vertex] @ turn.T + shift
+            return sky_visibility(self.stage.rest, lights, positions, layout.normals @ turn.T)
+
+        return self.stage.shared(("sky", self.index, self._unwrapped), make)
 
     def _normals(self, mesh: Mesh) -> Any:
         return self.layout.normals if mesh is self.rest.mesh else mesh.normals[self.layout.vertex]
@@ -156,6 +172,7 @@ class Body:
             "v": at.uv[:, 1],
             "atlas": np.zeros_like(at.uv),
             "welded": np.zeros(len(at.uv), np.uint32),
+            "sky": np.einsum("nk,nk->n", samples.barycentric, self.sky[self.layout.faces[samples.face]]),
         }
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
 

@@ -1,5 +1,6 @@
 // What is seen at each pixel: which object, where in its atlas, its normal, base colour and specular scale.
 
+import package::units::{Number};
 import package::mesh::{Vertex, Surface, bent_normal};
 import package::targets::{RGBA32Float, RGBA16Float, RGBA8UnormSrgb};
 
@@ -22,10 +23,11 @@ struct Varying {
     @location(1) normal: vec3f,
     @location(2) uv: vec2f,
     @location(3) atlas: vec2f,
+    @location(4) sky: Number,
 }
 
 struct GBuffer {
-    @location(0) where_seen: RGBA32Float, // atlas u, v; object id; 1
+    @location(0) where_seen: RGBA32Float, // atlas u, v; object id; share of the sky that is not hidden
     @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
     @location(2) base_color: RGBA8UnormSrgb, // of the map alone: 8 bits hold its texels, but not their products
 }
@@ -35,7 +37,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
     let x = surface.object_to_world * vec4f(vertex.position, 1.0);
     let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
-    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas);
+    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas, vertex.sky);
 }
 
 @fragment
@@ -48,5 +50,5 @@ fn fs(in: Varying) -> GBuffer {
     }
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
-    return GBuffer(vec4f(in.atlas, f32(surface.id), 1.0), vec4f(n, specular), vec4f(color, 1.0));
+    return GBuffer(vec4f(in.atlas, f32(surface.id), in.sky), vec4f(n, specular), vec4f(color, 1.0));
 }

@@ -35,13 +35,14 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    let seen = textureLoad(where_seen, texel, 0);
+    if u32(seen.z) != surface.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
-    var total = transmitted_environment(environment, linear_wrap_u, n);
+    var total = transmitted_environment(environment, linear_wrap_u, n, seen.w);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);

@@ -29,7 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let uv = vec2f(point.u, point.v);
     let color = textureSampleLevel(base_color_map, linear_repeat, uv, 0.0).rgb;
     let specular = surface.specular * textureSampleLevel(specular_map, linear_repeat, uv, 0.0).r;
-    var total = transmitted_environment(environment, linear_wrap_u, n);
+    var total = transmitted_environment(environment, linear_wrap_u, n, point.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);

@@ -1,5 +1,6 @@
 // L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
 
+import package::units::{Number};
 import package::mesh::{Vertex, Surface, bent_normal, color_before};
 import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
@@ -29,6 +30,7 @@ struct Varying {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     @location(2) uv: vec2f,
+    @location(3) sky: Number,
 }
 
 struct Texel {
@@ -41,7 +43,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let x = surface.object_to_world * vec4f(vertex.position, 1.0);
     let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
     let clip = vec4f(vertex.atlas.x * 2.0 - 1.0, 1.0 - vertex.atlas.y * 2.0, 0.0, 1.0);
-    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v));
+    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky);
 }
 
 @fragment
@@ -52,7 +54,7 @@ fn fs(in: Varying) -> Texel {
     let n = bent_normal(normalize(in.normal), x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
-    var irradiance = transmitted_environment(environment, linear_wrap_u, n);
+    var irradiance = transmitted_environment(environment, linear_wrap_u, n, in.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);

@@ -36,7 +36,7 @@ def rho_dt_table(graph: Graph, material: Material) -> Handle:
 
 def prefilter(gpu: Gpu, lights: Sequence[EnvironmentLight], material: Material) -> Prefiltered:
     """The sum of all environments, prefiltered for a material's surface; black where there are none."""
-    pixels = _sum(lights)
+    pixels = summed(lights)
     if not pixels.any():
         black = gpu.texture(np.zeros((1, 1, 4)), "rgba16float")
         return Prefiltered(black, black)
@@ -68,7 +68,7 @@ def prefilter(gpu: Gpu, lights: Sequence[EnvironmentLight], material: Material) 
     return Prefiltered(*(gpu.texture(maps[name], "rgba16float") for name in ("irradiance", "reflection")))
 
 
-def _sum(lights: Sequence[EnvironmentLight]) -> npt.NDArray[np.float32]:
+def summed(lights: Sequence[EnvironmentLight]) -> npt.NDArray[np.float32]:
     """All environments added up, at the resolution that the filters read; 32 x 16 where constant."""
     total = np.zeros((16, 32, 3), np.float32)
     for light in lights:
