@@ -41,16 +41,18 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    let seen = textureLoad(where_seen, texel, 0);
+    if u32(seen.z) != surface.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
     let w_o = direction_to_eye(params.eye, x);
-    // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance.
+    // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance. The share of the
+    // sky that is hidden is that of the whole hemisphere, not of the lobe.
     let mirrored = textureSampleLevel(reflection, linear_wrap_u, lat_long_of_direction(reflect(-w_o, n)), 0.0).rgb;
-    var total = mirrored * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
+    var total = seen.w * mirrored * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
