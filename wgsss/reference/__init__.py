@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from wgsss.reference.estimate import Estimate, Reference
+from wgsss.reference.integral import Integral
+from wgsss.reference.volume import Volume
 
-REFERENCES: dict[str, type[Reference]] = {}
+REFERENCES: dict[str, type[Reference]] = {"volume": Volume}
 """those that can be asked for by name where a method can"""
 
 __all__ = ["REFERENCES", "Estimate", "Reference"]
