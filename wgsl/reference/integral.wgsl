@@ -1,0 +1,66 @@
+// M by brute force: the sum of R_d(|x_i - x_o|) L_d(x_i) dA over samples of a surface (Maisch & Ropinski 2017, eq. 5).
+//
+// Samples come in blocks; each workgroup has a list of those that lie within the profile's range of its receivers. Each
+// block is summed before it is added, since a sum of many small numbers would lose them to rounding.
+
+import package::units::{Area, Irradiance, Number, Position, Direction};
+
+const LANES: u32 = 64u;  // receivers of a workgroup
+const BLOCK: u32 = 256u; // samples
+const SHIFT: u32 = 17u;  // bits of a squared distance between the entries of the kernel: 64 for each time it doubles
+
+struct Params {
+    first_entry: u32, // of the kernel, as the leading bits of the squared distance
+    first_group: u32, // of the workgroups with a list
+}
+
+struct Sample {
+    position: Position,
+    normal: Direction,
+    flux: Irradiance,  // L_d dA, W/m^2 mm^2
+}
+
+struct Receiver {
+    position: Position,
+    normal: Direction,
+}
+
+struct Sums {
+    front: Irradiance,
+    back: Irradiance,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> kernel: array<vec4f>; // R_d, 1/mm^2; how much of it is sampled on the same sheet
+@group(0) @binding(2) var<storage, read> samples: array<Sample>;
+@group(0) @binding(3) var<storage, read> receivers: array<Receiver>;
+@group(0) @binding(4) var<storage, read> starts: array<u32>;   // of the groups' lists
+@group(0) @binding(5) var<storage, read> blocks: array<u32>;
+@group(0) @binding(6) var<storage, read_write> sums: array<Sums>;
+
+@compute @workgroup_size(LANES)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let receiver = receivers[(params.first_group + group.x) * LANES + lane];
+    let last = arrayLength(&kernel) - 2u;
+    var total = Sums(vec3f(0.0), vec3f(0.0));
+    for (var j = starts[group.x]; j < starts[group.x + 1u]; j++) {
+        var part = Sums(vec3f(0.0), vec3f(0.0));
+        for (var i = 0u; i < BLOCK; i++) {
+            let sample = samples[blocks[j] * BLOCK + i];
+            let d = sample.position - receiver.position;
+            let bits = bitcast<u32>(dot(d, d));
+            let wanted = max(bits >> SHIFT, params.first_entry) - params.first_entry;
+            let entry = min(wanted, last);
+            let between = f32(bits & ((1u << SHIFT) - 1u)) / f32(1u << SHIFT);
+            let R = mix(kernel[entry], kernel[entry + 1u], select(between, 1.0, wanted > last));
+            let opposed = dot(sample.normal, receiver.normal) < 0.0;
+            let is_back = opposed && dot(d, receiver.normal) < 0.0;
+            let M = sample.flux * R.rgb * select(R.a, 1.0, opposed);
+            part.front += select(M, vec3f(0.0), is_back);
+            part.back += select(vec3f(0.0), M, is_back);
+        }
+        total.front += part.front;
+        total.back += part.back;
+    }
+    sums[group.x * LANES + lane] = total;
+}

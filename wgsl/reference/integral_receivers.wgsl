@@ -1,0 +1,41 @@
+// Where each pixel sees a surface: the face, and where on it.
+
+import package::mesh::{Vertex, Surface, color_after};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    world_to_clip: mat4x4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var<storage, read> corners: array<u32>; // vertices of the faces
+@group(0) @binding(4) var base_color_map: texture_2d<f32>;
+@group(0) @binding(5) var linear_repeat: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) barycentric: vec2f,
+    @location(1) uv: vec2f,
+    @location(2) @interpolate(flat) face: u32,
+}
+
+struct Receivers {
+    @location(0) place: RGBA32Float, // the first two barycentric coordinates; face; object id
+    @location(1) color: RGBA32Float, // the base colour's share after diffusion
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[corners[i]];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let barycentric = vec2f(f32(i % 3u == 0u), f32(i % 3u == 1u));
+    return Varying(params.world_to_clip * x, barycentric, vec2f(vertex.u, vertex.v), i / 3u);
+}
+
+@fragment
+fn fs(in: Varying) -> Receivers {
+    let color = color_after(surface, textureSample(base_color_map, linear_repeat, in.uv).rgb);
+    return Receivers(vec4f(in.barycentric, f32(in.face), f32(surface.id)), vec4f(color, 1.0));
+}

@@ -1,0 +1,160 @@
+"""Sums over samples of a surface for many receivers, on the GPU, a moment at a time and kept as they come."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss import wgsl
+from wgsss.bake.cache import KeyPart, cached
+from wgsss.gpu import LIMITS, Gpu
+from wgsss.graph import Graph
+from wgsss.reference.kernel import Kernel
+
+Array = npt.NDArray[Any]
+
+_MODULE = "reference/integral"
+_TILE = 1 << 15  # samples of one dispatch: lavapipe ends loops after 65,535 turns, those of nested ones together
+_SUBMISSION = 0.5  # seconds that a dispatch may take
+_FIRST_RATE = 1e7  # pairs of receiver and sample per second that any device manages
+_PART = 1 << 31  # pairs between two entries of the cache, the most that is lost when interrupted
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of a surface with their normals, in the object's own space: (N, 3) each, mm."""
+
+    position: Array
+    normal: Array
+
+    def __getitem__(self, which: Any) -> Points:
+        return Points(self.position[which], self.normal[which])
+
+
+def surface_sum(
+    gpu: Gpu, kernel: Kernel, samples: Points, flux: Array, receivers: Points, bar: Any
+) -> tuple[Array, Array]:
+    """The sums of kernel(|x_i - x_o|) times the `flux` (N, 3) of samples, for each receiver: front and back (M, 3).
+
+    Equal arguments give equal bits on one adapter. Parts of the sum are cached as they are done, so that what is
+    interrupted goes on where it was. `bar`, of tqdm, counts pairs of a receiver and a sample.
+    """
+    source = _Source(gpu, kernel, samples, flux)
+    order = _along_curve(receivers.position)
+    part = max(_PART // len(flux) // source.lanes, 1) * source.lanes
+    front, back = np.zeros((2, len(order), 3))
+    for first in range(0, len(order), part):
+        chosen = order[first : first + part]
+        some = receivers[chosen]
+        key: list[KeyPart] = [source.digest, some.position, some.normal, gpu.name]
+        sums = cached("integral-part", key, partial(source.summed, some, bar), code=[_MODULE])
+        front[chosen], back[chosen] = sums["front"], sums["back"]
+        bar.update(len(chosen) * len(flux) - bar.n + first * len(flux))
+    return front, back
+
+
+class _Source:
+    """Samples on the GPU, in blocks whose bounds say which of them a group of receivers needs."""
+
+    def __init__(self, gpu: Gpu, kernel: Kernel, samples: Points, flux: Array) -> None:
+        self.gpu, self.kernel, self.rate = gpu, kernel, _FIRST_RATE
+        module = wgsl.load(_MODULE)
+        self.lanes, self.block = module.constants["LANES"], module.constants["BLOCK"]
+        self.samples_layout, self.receivers_layout = (
+            module.layout(f"array<{name}>") for name in ("Sample", "Receiver")
+        )
+        order = _along_curve(samples.position)
+        order = np.append(order, np.repeat(order[-1], -len(order) % self.block))  # whole blocks
+        flux = flux[order]
+        flux[len(samples.position) :] = 0.0
+        value = {"position": samples.position[order], "normal": samples.normal[order], "flux": flux}
+        packed = self.samples_layout.pack(value)
+        digest = hashlib.sha256(packed)
+        digest.update(kernel.table.tobytes() + bytes([kernel.first & 255, kernel.first >> 8]))
+        self.digest = digest.digest()
+        step = _TILE * self.samples_layout.size
+        self.tiles = [gpu.buffer(packed[at : at + step]) for at in range(0, len(packed), step)]
+        self.table = gpu.buffer(kernel.table)
+        self.low, self.high = _bounds(value["position"], self.block)
+
+    def summed(self, receivers: Points, bar: Any) -> dict[str, Array]:
+        """The sums for some receivers."""
+        count = len(receivers.position)
+        whole = np.minimum(np.arange(count + -count % self.lanes), count - 1)
+        padded = receivers[whole]
+        groups = len(whole) // self.lanes
+        packed = self.receivers_layout.pack({"position": padded.position, "normal": padded.normal})
+        buffer = self.gpu.buffer(packed)
+        bounds = _bounds(padded.position, self.lanes)
+        sums = np.zeros((2, len(whole), 3))
+        tile_blocks = _TILE // self.block
+        for tile, buffered in enumerate(self.tiles):
+            low, high = (edge[tile * tile_blocks : (tile + 1) * tile_blocks] for edge in (self.low, self.high))
+            first = 0
+            while first < groups:
+                most = LIMITS["max-compute-workgroups-per-dimension"]
+                pairs = self.lanes * self.block * np.maximum(len(low), 1)
+                some = int(np.clip(self.rate * _SUBMISSION // pairs, 1, min(groups - first, most, 4096)))
+                chosen = slice(first, first + some)
+                near = _near([b[chosen] for b in bounds], (low, high), self.kernel.reach)
+                found = self._dispatch(buffered, buffer, near, first)
+                sums[0, first * self.lanes : (first + some) * self.lanes] += found["front"]
+                sums[1, first * self.lanes : (first + some) * self.lanes] += found["back"]
+                first += some
+                bar.update(some * self.lanes * len(low) * self.block)
+        return {"front": sums[0, :count], "back": sums[1, :count]}
+
+    def _dispatch(self, samples: Any, receivers: Any, near: Array, first: int) -> Array:
+        """The sums over the blocks of one tile that are `near` (groups, blocks) each group."""
+        start = time.perf_counter()
+        graph = Graph(self.gpu)
+        sums = graph.dispatch(
+            _MODULE,
+            size=len(near) * self.lanes,
+            params={"first_entry": self.kernel.first, "first_group": first},
+            kernel=self.table,
+            samples=samples,
+            receivers=receivers,
+            starts=np.append(0, np.cumsum(near.sum(axis=1))),
+            blocks=np.nonzero(near)[1],
+        )
+        graph.run(sums)
+        found = graph.read(sums)
+        pairs = int(near.sum()) * self.lanes * self.block
+        rate = pairs / (time.perf_counter() - start)
+        self.rate = float(np.clip(rate, self.rate / 2, self.rate * 4)) if pairs > 1e5 else self.rate
+        return found
+
+
+def _bounds(positions: Array, block: int) -> tuple[Array, Array]:
+    """The least and greatest coordinates (n, 3) of each block of positions."""
+    blocks = positions.reshape(-1, block, 3)
+    return blocks.min(axis=1), blocks.max(axis=1)
+
+
+def _near(a: Any, b: Any, reach: float) -> Array:
+    """bool (n, m): which boxes `a` (low, high; (n, 3) each) lie within `reach` of which boxes `b`."""
+    (a_low, a_high), (b_low, b_high) = a, b
+    square = np.zeros((len(a_low), len(b_low)))
+    for axis in range(3):
+        gap = np.maximum(b_low[:, axis] - a_high[:, axis, None], a_low[:, axis, None] - b_high[:, axis])
+        square += np.square(np.maximum(gap, 0.0))
+    return square < reach * reach
+
+
+def _along_curve(positions: Array) -> Array:
+    """An order of positions in which neighbours are near each other: along Morton's curve."""
+    low = positions.min(axis=0)
+    size = max(float((positions.max(axis=0) - low).max()), 1e-30)
+    cell = ((positions - low) * (1023.0 / size)).astype(np.uint32)
+    code = np.zeros(len(cell), np.uint32)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
