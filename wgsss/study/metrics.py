@@ -18,7 +18,7 @@ _ROUNDING = 2.0**-20  # of the peak: what differs by less, differs by how sums i
 
 @dataclass(frozen=True)
 class Errors:
-    """An estimate of M against a reference, over the pixels that show an object. None where a measure has no meaning."""
+    """An estimate of M against a reference, over the pixels that show an object. None: the measure has no meaning."""
 
     rel_rmse: float | None
     """root mean square of the difference over that of the reference, of pixels and channels; None: it is black"""
@@ -35,7 +35,9 @@ class Errors:
 
     def json(self) -> dict[str, float | None]:
         """What JSON can hold: null for what is undefined or infinite."""
-        return {key: value if value is not None and math.isfinite(value) else None for key, value in asdict(self).items()}
+        return {
+            key: value if value is not None and math.isfinite(value) else None for key, value in asdict(self).items()
+        }
 
 
 def errors(

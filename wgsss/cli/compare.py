@@ -1,0 +1,64 @@
+"""`wgsss compare`: methods beside a reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from wgsss.cli import arguments
+
+_OUTPUT = """the folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); what
+else is in it stays"""
+
+
+def declare(commands: Any) -> None:
+    parser = arguments.command(commands, "compare", run, "compare methods with a reference: pictures, errors, costs")
+    arguments.add_scene(parser)
+    add = parser.add_argument
+    add("--methods", metavar="A,B,…", type=names, help="default: all (see 'wgsss methods')")
+    add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
+    add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
+    add("--lights", choices=["all"], help="'all': also under one light of each type, of the same mean irradiance")
+    add("-o", "--output", metavar="DIR", type=Path, help=_OUTPUT)
+
+
+def run(args: Any) -> None:
+    from dataclasses import replace
+
+    from wgsss.methods import METHODS, make_method
+    from wgsss.study import tables
+    from wgsss.study.compare import compare, make_reference
+    from wgsss.study.report import check_folder, write_report
+
+    folder = check_folder(args.output or Path(f"{Path(args.scene).stem}-compare"))
+    methods = [make_method(name) for name in args.methods or METHODS]
+    reference = make_reference(args.reference)
+    scene = arguments.load_scene(args)
+    found = compare(scene, methods, reference, args.size)
+    if args.lights:
+        from wgsss.study.light_types import light_types
+
+        lit = light_types(scene).items()
+        found = replace(
+            found,
+            lights={name: compare(other, methods, reference, args.size, by_cause=False) for name, other in lit},
+        )
+    written = write_report(found, folder)
+
+    result = {**found.json(), "files": [str(file) for file in written]}
+    parts = [tables.aligned(tables.by_method(found)), tables.floor(found)]
+    if found.causes:
+        parts.append(f"by cause: alone (and what it adds)\n{tables.aligned(tables.by_cause(found))}")
+    if found.lights:
+        parts.append(f"by type of light: rel RMSE\n{tables.aligned(tables.by_light(found))}")
+    arguments.tell(args, result, "\n\n".join([*parts, str(folder / "report.html")]))
+
+
+def names(text: str) -> list[str]:
+    """NAME,NAME,…, each once."""
+    found = [name.strip() for name in text.split(",")]
+    if not all(found):
+        import argparse
+
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of names such as lambert,deon07")
+    return list(dict.fromkeys(found))

@@ -1,0 +1,187 @@
+"""Methods beside a reference: their pictures, what they cost and how far off they are."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from wgsss.errors import unknown
+from wgsss.graph import Graph
+from wgsss.methods import METHODS, Method, make_method, name_of
+from wgsss.reference import REFERENCES, Estimate, Reference
+from wgsss.rendering import Image, Renderer
+from wgsss.scene import Scene
+from wgsss.study.metrics import Errors, errors
+
+if TYPE_CHECKING:
+    from wgsss.study.causes import Causes
+
+Array = npt.NDArray[Any]
+
+WARM_FRAMES = 3
+"""frames that the time of one is the median of; the one before them pays for compilation"""
+_AOVS = ("M_front", "M_back", "irradiance", "depth")
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One method: what it made, what that cost and how far it is from the reference."""
+
+    name: str
+    """the method's, with its knobs where the method is there more than once"""
+    method: str
+    knobs: dict[str, Any]
+    bake_ms: float
+    """upload included; what the cache holds is read, not made"""
+    frame_ms: float
+    passes: dict[str, float]
+    """ms of each"""
+    bytes: int
+    """textures and buffers that a frame needs, transient and persistent"""
+    image: Image
+    errors: Errors
+
+    @property
+    def M(self) -> Array:
+        """(H, W, 3), W/m^2."""
+        return self.image.aovs["M_front"] + self.image.aovs["M_back"]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A scene by several methods and by a reference."""
+
+    scene: str
+    reference: str
+    size: tuple[int, int]
+    adapter: str
+    seen: Array
+    """bool (H, W): where an object shows"""
+    truth: Estimate
+    image: Image
+    """the frame that the reference makes"""
+    runs: tuple[Run, ...]
+    causes: dict[str, Causes] = field(default_factory=dict)
+    """by the runs' names; against the reference "volume" only"""
+    lights: dict[str, Comparison] = field(default_factory=dict)
+    """the same under lights of other types"""
+
+    def json(self) -> dict[str, Any]:
+        """The numbers: scene, reference, size, adapter, methods, and causes and lights where there are."""
+        found: dict[str, Any] = {key: getattr(self, key) for key in ("scene", "reference", "adapter")}
+        found |= {"size": list(self.size), "methods": [self._described(run) for run in self.runs]}
+        if self.causes:
+            found["causes"] = {name: causes.json() for name, causes in self.causes.items()}
+        if self.lights:
+            found["lights"] = {name: other.json()["methods"] for name, other in self.lights.items()}
+        return found
+
+    def _described(self, run: Run) -> dict[str, Any]:
+        own = {"scene": self.scene, "method": run.method, "knobs": run.knobs, "size": list(self.size)}
+        cost = {"bake_ms": run.bake_ms, "frame_ms": run.frame_ms, "passes": run.passes, "bytes": run.bytes}
+        return {**own, "adapter": self.adapter, **cost, "error": run.errors.json()}
+
+
+def compare(
+    scene: Scene,
+    methods: Sequence[str | Method] = tuple(METHODS),
+    reference: str | Reference = "integral",
+    size: tuple[int, int] = (256, 256),
+    time: float = 0.0,
+    *,
+    by_cause: bool = True,
+) -> Comparison:
+    """Render `scene`, `time` seconds into its motion, by each method and by a reference, and measure the differences.
+
+    Methods and the reference are names, or instances with knobs of their own. Against "volume" the errors are split by
+    cause, where not told otherwise; that takes the integral two or three times over.
+
+    Raises InputError for names that are not known and scenes that the reference cannot have, and RenderError where a
+    number is not finite.
+    """
+    from tqdm import tqdm
+
+    made = named([make_method(method) if isinstance(method, str) else method for method in methods])
+    truth_by = make_reference(reference) if isinstance(reference, str) else reference
+    renderer = Renderer(scene, truth_by, size)
+    image = renderer.frame(time, _AOVS, timed=False)
+    truth = truth_by.estimate(renderer.stage, size)
+    image = replace(image, aovs={**image.aovs, "error": truth.error})
+    seen = image.pixels[..., 3] > 0.0
+    runs = []
+    for name, method in tqdm(made.items(), desc=scene.name, unit="method", file=sys.stderr, disable=None):
+        run = _run(name, method, scene, size, time)
+        found = errors(
+            run["image"].aovs["M_front"] + run["image"].aovs["M_back"],
+            truth.M,
+            seen,
+            error=truth.error,
+            display=run["image"].display,
+            reference_display=image.display,
+        )
+        runs.append(Run(name=name, errors=found, **run))
+    comparison = Comparison(scene.name, name_of(truth_by), size, renderer.gpu.name, seen, truth, image, tuple(runs))
+    if comparison.reference != "volume" or not by_cause:
+        return comparison
+    from wgsss.study.causes import causes
+
+    return replace(comparison, causes=causes(scene, {run.name: run.M for run in runs}, truth.M, seen, size, time))
+
+
+def make_reference(name: str) -> Reference:
+    """The reference of that name. Raises InputError for one that is not known."""
+    if name not in REFERENCES:
+        raise unknown("reference", name, REFERENCES)
+    made: Any = make_method(name)
+    return made
+
+
+def named(methods: Sequence[Method]) -> dict[str, Method]:
+    """Methods by their names, with the knobs where a name alone does not tell two apart. The same one twice is one."""
+    names = [name_of(method) for method in methods]
+    found = {}
+    for name, method in zip(names, methods, strict=True):
+        knobs = " ".join(f"{knob}={value}" for knob, value in vars(method).items())
+        twice = any(other == name and method != same for other, same in zip(names, methods, strict=True))
+        found[f"{name} {knobs}" if twice else name] = method
+    return found
+
+
+def _run(name: str, method: Method, scene: Scene, size: tuple[int, int], time: float) -> dict[str, Any]:
+    start = clock.perf_counter()
+    renderer = Renderer(scene, method, size)
+    baked = clock.perf_counter()
+    image = renderer.frame(time, _AOVS)
+    frames = [renderer.frame(time) for _ in range(WARM_FRAMES)]
+    totals = [sum(frame.timings.values()) for frame in frames]
+    median = frames[totals.index(statistics.median_low(totals))]
+    return {
+        "method": name_of(method),
+        "knobs": dict(vars(method)),
+        "bake_ms": 1000.0 * (baked - start),
+        "frame_ms": sum(median.timings.values()),
+        "passes": median.timings,
+        "bytes": footprint(median.graph),
+        "image": image,
+    }
+
+
+def footprint(graph: Graph) -> int:
+    """Bytes of textures and buffers that a graph needed when it ran: what persists, and most transients live at once."""
+    persistent = {id(held): held for item in graph.ran for held in item.imports.values()}
+    return graph.peak_bytes + sum(_nbytes(held) for held in persistent.values())
+
+
+def _nbytes(held: Any) -> int:
+    from wgsss.gpu import texel_bytes
+
+    if not hasattr(held, "format"):
+        return int(held.size)
+    levels = [max(held.width >> i, 1) * max(held.height >> i, 1) for i in range(held.mip_level_count)]
+    return sum(levels) * held.depth_or_array_layers * texel_bytes(held.format)

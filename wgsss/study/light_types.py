@@ -1,0 +1,84 @@
+"""One scene under lights of four types that give it the same irradiance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.emitters import DIRECTIONAL, PATCH, emitters
+from wgsss.scene import DirectionalLight, EnvironmentLight, PointLight, RectLight, Scene
+from wgsss.scene.light import Light
+
+Array = npt.NDArray[Any]
+
+# Towards the light, in the camera's frame (right, up, towards the viewer): from behind, where light must pass through
+# the object to be seen, and aside, so that a lit rim is seen too.
+_TOWARDS = (0.62, 0.45, -0.64)
+_DISTANCE = 3.0  # of a light that is near, in radii of the scene
+_SIDE = 1.5  # of an area light, in the same
+
+
+def light_types(scene: Scene, time: float = 0.0) -> dict[str, Scene]:
+    """The scene under one white light of each type, from behind and aside of the object as the camera sees it.
+
+    Without regard to shadows, the mean irradiance of the surface is that under the scene's own lights.
+    """
+    posed = scene.at(time)
+    centre = posed.bounds.mean(axis=0)
+    radius = max(float(np.linalg.norm(posed.bounds[1] - centre)), 1e-3)
+    towards = np.asarray(_TOWARDS) @ posed.camera.view()[:3, :3] / np.linalg.norm(_TOWARDS)
+    place: Any = tuple(centre + _DISTANCE * radius * towards)
+    up = (0.0, 0.0, 1.0) if abs(towards[1]) > 0.9 else (0.0, 1.0, 0.0)
+    side = _SIDE * radius
+    away: Any = tuple(-towards)
+    unit: dict[str, Light] = {
+        "directional": DirectionalLight(away, (1.0, 1.0, 1.0)),
+        "point": PointLight(place, (1.0, 1.0, 1.0)),
+        "area": RectLight(place, away, up, side, side, (1.0, 1.0, 1.0)),
+        "environment": EnvironmentLight((1.0, 1.0, 1.0)),
+    }
+    wanted = mean_irradiance(posed, posed.lights)
+    power = {"directional": "irradiance", "point": "intensity", "area": "radiance", "environment": "radiance"}
+    found = {}
+    for name, light in unit.items():
+        scale = wanted / (mean_irradiance(posed, (light,)) or 1.0)
+        lit: Any = replace(light, **{power[name]: (scale,) * 3})
+        found[name] = replace(scene, name=f"{scene.name}, {name}", lights=(lit,))
+    return found
+
+
+def mean_irradiance(scene: Scene, lights: Sequence[Light]) -> float:
+    """W/m^2, over the surface of a still scene and the channels, without shadows."""
+    position, normal, area = _triangles(scene)
+    total = np.zeros(3)
+    for light in emitters(lights, np.concatenate([o.placed for o in scene.objects])).lights:
+        to_light = np.asarray(light["position"], np.float64)
+        distance = np.ones(len(position))  # m
+        if light["kind"] != DIRECTIONAL:
+            to_light = to_light - position
+            length = np.linalg.norm(to_light, axis=1)
+            to_light, distance = to_light / length[:, None], length / 1000.0
+        facing = np.maximum(np.sum(normal * to_light, axis=1), 0.0)
+        if light["kind"] == PATCH:
+            facing *= np.maximum(-np.sum(to_light * light["normal"], axis=1), 0.0)
+        total += np.average(facing / np.square(distance), weights=area) * np.asarray(light["power"])
+    for light in lights:
+        if isinstance(light, EnvironmentLight):
+            pixels = light.pixels().astype(np.float64)
+            latitude = np.sin((np.arange(len(pixels)) + 0.5) / len(pixels) * math.pi)
+            total += math.pi * np.average(pixels.mean(axis=1), axis=0, weights=latitude)
+    return float(total.mean())
+
+
+def _triangles(scene: Scene) -> tuple[Array, Array, Array]:
+    """Of all triangles, in world space: centre (N, 3), normal (N, 3) and area (N,)."""
+    corners = np.concatenate([o.placed[o.mesh.faces] for o in scene.objects])
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normal, axis=1)
+    kept = twice > 0.0
+    return corners[kept].mean(axis=1), normal[kept] / twice[kept, None], 0.5 * twice[kept]

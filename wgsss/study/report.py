@@ -1,0 +1,169 @@
+"""A comparison as a folder: a page that needs no network, the contact sheet, the numbers and the images themselves."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.output import save
+from wgsss.rendering import Image
+from wgsss.study import contact_sheet, error_maps, tables
+from wgsss.study.causes import CAUSES, MEANINGS
+from wgsss.study.compare import Comparison
+
+Array = npt.NDArray[Any]
+
+OWN = "as in the scene"
+"""the lights that are the scene's own"""
+_PACKAGES = ("wgpu", "numpy", "flip-evaluator", "mitsuba")
+
+
+def write_report(comparison: Comparison, folder: Path) -> list[Path]:
+    """Write `report.html`, `contact_sheet.png`, `metrics.json` and, for the reference and each method, its picture
+    (.png), its error map (.error.png) and its linear M with what else was asked for (.exr); give back the files.
+
+    All appear at once, when all are written; files of other names that are in the folder stay.
+    Raises InputError where the folder cannot be written.
+    """
+    with _appearing(folder) as place:
+        numbers = {**comparison.json(), "versions": versions()}
+        (place / "metrics.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        (place / "report.html").write_text(page(comparison), encoding="utf-8")
+        contact_sheet.draw(comparison, place / "contact_sheet.png")
+        end = error_maps.top([comparison])
+        found = error_maps.maps(comparison)
+        for name, image in _named_images(comparison):
+            for ending in (".png", ".exr"):
+                save(image, place / f"{name}{ending}")
+        for name, values in found.items():
+            pixels = error_maps.coloured(values, comparison.seen, end)
+            (place / f"{_file(name)}.error.png").write_bytes(_png(pixels))
+        names = sorted(file.name for file in place.iterdir())
+    return [folder / name for name in names]
+
+
+def check_folder(folder: Path) -> Path:
+    """The folder, if a report can be written there; to be asked before anything that takes long. Raises InputError."""
+    with _appearing(folder):
+        return folder
+
+
+def page(comparison: Comparison) -> str:
+    """The page as HTML, with everything that it shows inside."""
+    here = Path(__file__).parent
+    text = (here / "report.html").read_text(encoding="utf-8")
+    data = json.dumps(_data(comparison), ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
+    parts = {"STYLE": (here / "report.css").read_text("utf-8"), "SCRIPT": (here / "report.js").read_text("utf-8")}
+    for name, part in {**parts, "DATA": data}.items():
+        text = text.replace(f"/*{name}*/", part)
+    return text
+
+
+def versions() -> dict[str, str]:
+    """Of wgsss and of what the numbers depend on."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    from wgsss import __version__
+
+    found = {"wgsss": __version__}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # of those that can be done without
+            continue
+    return found
+
+
+def _data(comparison: Comparison) -> dict[str, Any]:
+    """What the page shows."""
+    everything = {OWN: comparison, **comparison.lights}
+    end = error_maps.top(everything.values())
+    ticks = [{"at": (t / end) ** error_maps.CURVE, "text": tables.percent(t)} for t in error_maps.ticks(end)]
+    width, height = comparison.size
+    return {
+        "title": f"{comparison.scene} against {comparison.reference}",
+        "about": f"{width} x {height} pixels · {comparison.adapter}",
+        "versions": " · ".join(f"{name} {number}" for name, number in versions().items()),
+        "size": [width, height],
+        "scale": {"bar": _uri(error_maps.bar()), "ticks": ticks},
+        "lights": [_light(name, other, end) for name, other in everything.items()],
+        "by_light": tables.by_light(comparison) if comparison.lights else [],
+        "causes": _causes(comparison) if comparison.causes else None,
+    }
+
+
+def _light(name: str, comparison: Comparison, end: float) -> dict[str, Any]:
+    truth = comparison.reference
+    images = [{"name": truth, "title": truth, "note": "reference", "source": _uri(comparison.image.display)}]
+    for run in comparison.runs:
+        note = tables.percent(run.errors.rel_rmse)
+        images.append({"name": run.name, "title": run.name, "note": note, "source": _uri(run.image.display)})
+    own = error_maps.own(comparison)
+    for key, values in {truth: own, **error_maps.maps(comparison)}.items():
+        source = _uri(error_maps.coloured(values, comparison.seen, end))
+        images.append({"name": key, "title": f"{key}: {'its own ' if key == truth else ''}error", "source": source})
+    return {"name": name, "images": images, "figures": tables.by_method(comparison), "floor": tables.floor(comparison)}
+
+
+def _causes(comparison: Comparison) -> dict[str, Any]:
+    rows = [
+        {"name": name, "total": found.total, "parts": [found.part[cause] for cause in CAUSES]}
+        for name, found in comparison.causes.items()
+    ]
+    meanings = [MEANINGS[cause] for cause in CAUSES]
+    return {"names": CAUSES, "meanings": meanings, "rows": rows, "table": tables.by_cause(comparison)}
+
+
+def _named_images(comparison: Comparison) -> Iterator[tuple[str, Image]]:
+    yield comparison.reference, comparison.image
+    for run in comparison.runs:
+        yield _file(run.name), run.image
+
+
+def _file(name: str) -> str:
+    return name.replace(" ", "_")
+
+
+def _png(pixels: Array) -> bytes:
+    from PIL import Image as Picture
+
+    stream = io.BytesIO()
+    Picture.fromarray(np.ascontiguousarray(pixels)).save(stream, format="png", optimize=True)
+    return stream.getvalue()
+
+
+def _uri(pixels: Array) -> str:
+    return f"data:image/png;base64,{base64.b64encode(_png(pixels)).decode()}"
+
+
+@contextmanager
+def _appearing(folder: Path) -> Iterator[Path]:
+    """A folder to write to, whose files move to `folder` when the block ends and vanish if it fails."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: this is not a folder")
+    if not folder.resolve().parent.is_dir():
+        raise InputError(f"{folder}: there is no folder '{folder.parent}'")
+    place = folder.resolve().with_name(f".{folder.resolve().name}.{os.getpid()}")
+    try:
+        place.mkdir()
+        yield place
+        files = list(place.iterdir())
+        if files:
+            folder.mkdir(exist_ok=True)
+        for file in files:
+            os.replace(file, folder / file.name)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
