@@ -7,7 +7,7 @@ import package::units::{Area, Irradiance, Number, Position, Direction};
 
 const LANES: u32 = 64u;  // receivers of a workgroup
 const BLOCK: u32 = 256u; // samples
-const SHIFT: u32 = 17u;  // bits of a squared distance between the entries of the kernel: 64 for each time it doubles
+const SHIFT: u32 = 15u;  // bits of a squared distance between the entries of the kernel: 256 for each time it doubles
 
 struct Params {
     first_entry: u32, // of the kernel, as the leading bits of the squared distance

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import time
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,11 +51,15 @@ def surface_sum(
     for first in range(0, len(order), part):
         chosen = order[first : first + part]
         some = receivers[chosen]
-        key: list[KeyPart] = [source.digest, some.position, some.normal, gpu.name]
-        sums = cached("integral-part", key, partial(source.summed, some, bar), code=[_MODULE])
+        sums = _part(source, some, bar)
         front[chosen], back[chosen] = sums["front"], sums["back"]
         bar.update(len(chosen) * len(flux) - bar.n + first * len(flux))
     return front, back
+
+
+def _part(source: _Source, receivers: Points, bar: Any) -> dict[str, Array]:
+    key: list[KeyPart] = [source.digest, receivers.position, receivers.normal, source.gpu.name]
+    return cached("integral-part", key, lambda: source.summed(receivers, bar), code=[_MODULE])
 
 
 class _Source:

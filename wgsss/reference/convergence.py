@@ -1,0 +1,94 @@
+"""M at places on a body, summed over ever denser samples of its surface until it stops moving."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.samples import Samples, subdivided
+from wgsss.frame import begin, irradiance_points
+from wgsss.graph import Graph
+from wgsss.optics import Profile
+from wgsss.reference.kernel import make_kernel
+from wgsss.reference.surface_sum import Points, surface_sum
+from wgsss.scene import Mesh
+from wgsss.stage import Body
+
+Array = npt.NDArray[Any]
+
+RADIUS = 3.0
+"""Spacings within which L_d is taken as the same all over: with fewer, samples miss narrow profiles."""
+_RESOLVED = 0.25  # share of the light that leaves outside of that radius from the start, in the widest channel
+_POINTS = 1 << 18  # whose L_d one pass gathers
+
+
+def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float, samples: int) -> SimpleNamespace:
+    """front, back and error (N, 3) of M at places on a body, without the base colour after diffusion, by samples dense
+    enough for a change within `tolerance`, RMS, or as many as there may be; then a `note` says so."""
+    L_d = irradiance_at(body, receivers)
+    spacing = _first_spacing(body.mesh, profile)
+    last = at_spacing(body, receivers, L_d, profile, spacing)
+    while True:
+        spacing /= 2
+        found = at_spacing(body, receivers, L_d, profile, spacing)
+        found.error = np.abs(found.front + found.back - last.front - last.back)
+        size = np.sqrt(np.square(found.front + found.back).mean(axis=0))
+        moved = float((np.sqrt(np.square(found.error).mean(axis=0)) / np.where(size > 0, size, 1.0)).max())
+        enough = moved <= tolerance
+        if enough or _count(body.mesh, spacing / 2) > samples:
+            at_most = f"from {last.samples} to {found.samples} samples, and no more than {samples} may be taken"
+            what = f"{body.material.name} on {body.mesh.name}"
+            found.note = "" if enough else f"{what}: M still moves by {100 * moved:.2g} % {at_most}"
+            return found
+        last = found
+
+
+def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spacing: float) -> SimpleNamespace:
+    """front and back (N, 3) at places where L_d (N, 3) is known, by samples at most `spacing` mm apart, and how many
+    `samples` that took."""
+    from tqdm import tqdm
+
+    mesh = body.mesh
+    across = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+    chosen = subdivided(mesh, spacing)
+    there, here = body.at(chosen), body.at(receivers)
+    flux = irradiance_at(body, chosen) * there.area[:, None]
+    kernel = make_kernel(profile, RADIUS * spacing, across)
+    total = len(flux) * len(L_d)
+    label = f"{mesh.name}, {len(flux)} samples"
+    with tqdm(total=total, desc=label, unit=" pairs", unit_scale=True, file=sys.stderr, disable=None) as bar:
+        sources, places = (Points(at.position, at.normal) for at in (there, here))
+        front, back = surface_sum(body.stage.gpu, kernel, sources, flux, places, bar)
+    return SimpleNamespace(front=front + kernel.near * L_d, back=back, samples=len(flux))
+
+
+def _first_spacing(mesh: Mesh, profile: Profile) -> float:
+    """The widest spacing, mm, that is worth a try: a sample a face or more, and the profile's width told apart."""
+    corners = mesh.positions[mesh.faces].astype(np.float64)
+    longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+    width = float(profile.range(_RESOLVED).max())
+    return min(longest, width / RADIUS) if width > 0.0 else longest
+
+
+def _count(mesh: Mesh, spacing: float) -> int:
+    """How many samples at `spacing` mm are."""
+    corners = mesh.positions[mesh.faces].astype(np.float64)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return int(np.square(np.maximum(np.ceil(longest / spacing), 1)).sum())
+
+
+def irradiance_at(body: Body, places: Samples) -> Array:
+    """L_d (N, 3), W/m^2, times the base colour's share before diffusion, at places on a body."""
+    graph = Graph(body.stage.gpu)
+    frame = begin(graph, body.stage, (1, 1))
+    handles = []
+    for first in range(0, len(places.face), _POINTS):
+        some = slice(first, first + _POINTS)
+        chosen = Samples(places.face[some], places.barycentric[some], places.share[some])
+        handles.append(irradiance_points(frame, body, body.points(chosen), len(chosen.face)))
+    graph.run(*handles, timed=True)  # each pass in a submission of its own
+    return np.concatenate([graph.read(h)[:, :3] for h in handles])
