@@ -1,0 +1,81 @@
+"""`wgsss bench`: what methods cost and how far off they are, over their knobs, as a chart."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from wgsss.cli import arguments
+from wgsss.cli.compare import names
+
+_SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
+_FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
+_SCHEDULER = "of a Dask cluster to run on (default: run here)"
+
+
+def declare(commands: Any) -> None:
+    parser = arguments.command(commands, "bench", run, "chart speed against accuracy, for all methods over their knobs")
+    add = parser.add_argument
+    add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
+    add("--methods", metavar="NAME,NAME,…", type=names, help="default: all (see 'wgsss methods')")
+    add("--reference", metavar="NAME", default="integral", help="what errors are measured against (default: integral)")
+    add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
+    add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)
+    add("-o", "--output", metavar="DIR", type=Path, default=Path("bench"), help=_FOLDER)
+
+
+def run(args: Any) -> None:
+    from wgsss.study.bench import bench, read
+    from wgsss.study.chart import draw
+
+    if args.scenes:
+        from wgsss.scene import load_scene
+
+        scenes = [load_scene(name) for name in dict.fromkeys(args.scenes)]
+        runs = bench(
+            scenes,
+            args.methods,
+            args.output,
+            args.size,
+            reference=args.reference,
+            scheduler=args.scheduler,
+            tell=_tell,
+        )
+    else:
+        runs = read(args.output)
+    files = [str(file) for file in draw(read(args.output), args.output)]
+    arguments.tell(args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *files]))
+
+
+def _tell(run: dict[str, Any]) -> None:
+    """A line per run where no bar shows how far it is."""
+    if not sys.stderr.isatty():
+        print("  ".join(cell for cell in _row(run) if cell), file=sys.stderr, flush=True)
+
+
+def _rows(runs: list[dict[str, Any]]) -> list[list[str]]:
+    head = ["scene", "method", "knobs", "bake, ms", "frame, ms", "middle half", "MB", "error, %", "PSNR, dB", "FLIP"]
+    return [[*head, "bias"], *(_row(run) for run in runs)]
+
+
+def _row(run: dict[str, Any]) -> list[str]:
+    low, high = run["frame_ms_quartiles"]
+    error = run["error"]
+    return [
+        run["scene"],
+        run["method"],
+        " ".join(f"{knob}={value}" for knob, value in run["knobs"].items()),
+        f"{run['bake_ms']:.0f}{'' if run['bake_cached'] else ' cold'}",
+        f"{run['frame_ms']:.2f}",
+        f"{low:.2f} to {high:.2f}",
+        f"{run['bytes'] / 1e6:.1f}",
+        _number(error["rel_rmse"], 100.0, "{:.3g}"),
+        _number(error["psnr"], 1.0, "{:.1f}"),
+        _number(error["flip"], 1.0, "{:.4f}"),
+        _number(error["bias"], 1.0, "{:.3f}"),
+    ]
+
+
+def _number(value: float | None, scale: float, form: str) -> str:
+    return "" if value is None else form.format(scale * value)

@@ -1,0 +1,179 @@
+"""Speed against accuracy: every method over its knobs, one line of a file per run."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wgsss.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from wgsss.scene import Scene
+    from wgsss.study.run import Spec
+
+Run = dict[str, Any]
+"""what `wgsss.study.run.measure` gives back: what a line of the file holds"""
+
+Task = tuple["Scene", "Spec"]
+Place = tuple[set[str], Callable[[Sequence[Task]], Iterator[Run]]]
+"""where runs are done: its adapters, and what does them"""
+
+FILE = "runs.jsonl"
+DEFAULT_REFERENCE = "integral"
+_SAME = ("scene", "digest", "method", "knobs", "size", "reference", "version")
+
+
+def bench(
+    scenes: Sequence[Scene],
+    methods: Sequence[str] | None = None,
+    folder: str | Path = "bench",
+    size: tuple[int, int] = (256, 256),
+    *,
+    reference: str = DEFAULT_REFERENCE,
+    scheduler: str | None = None,
+    tell: Callable[[Run], None] = lambda run: None,
+) -> list[Run]:
+    """Measure each of `methods` (by default all) at each setting of its sweep, in each scene, against a reference.
+
+    Runs are appended to `runs.jsonl` in `folder` as they end, and those that are there already, of the same scene,
+    method, knobs, size, reference, adapter and version, are not done again: what is stopped goes on where it was.
+
+    Args:
+        size: width and height, pixels.
+        reference: its name, as of `REFERENCES`.
+        scheduler: address of a Dask cluster to run on; by default runs are done here, one after the other. Each worker
+            should have a machine for itself, since what else runs there slows what is measured.
+        tell: called with each run as it ends.
+
+    Returns:
+        The runs asked for, done now or before, by scene, method and setting.
+
+    Raises:
+        InputError: for names that are not known, a scene that a method or the reference cannot have, a folder that
+            cannot be written, a scheduler that is not there.
+        RenderError: where a number is not finite. The runs before it are kept.
+    """
+    from tqdm import tqdm
+
+    specs = [(scene, spec) for scene in scenes for spec in _specs(scene, methods, size, reference)]
+    path = _prepared(Path(folder))
+    with _cluster(scheduler) if scheduler else _here() as (adapters, runs):
+        done = {_key(run): run for run in read(path.parent) if run["adapter"] in adapters}
+        todo = [(scene, spec) for scene, spec in specs if _key(spec.json()) not in done]
+        bar = tqdm(total=len(specs), initial=len(specs) - len(todo), unit="run", file=sys.stderr, disable=None)
+        with bar:
+            for run in runs(todo):
+                _append(path, run)
+                done[_key(run)] = run
+                bar.update()
+                tell(run)
+    return [done[_key(spec.json())] for _, spec in specs]
+
+
+def read(folder: str | Path) -> list[Run]:
+    """The runs in a folder, in the order in which they ended. A last line that was cut off is no run.
+
+    Raises InputError where there are none, and for a line that is not a run.
+    """
+    path = Path(folder) / FILE
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    runs = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            run = json.loads(line)
+            _key(run), run["adapter"], run["frame_ms"], run["error"]["rel_rmse"]
+        except (ValueError, KeyError, TypeError):
+            raise InputError(f"{path}: line {number} is not a run") from None
+        runs.append(run)
+    return runs
+
+
+def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[Spec]:
+    """What is to be measured in a scene, each setting once."""
+    from wgsss.methods import METHODS, make_method
+    from wgsss.reference import REFERENCES
+    from wgsss.study.run import Spec, digest
+
+    for method in methods or ():
+        if method not in METHODS:
+            raise unknown("method", method, METHODS)
+    if reference not in REFERENCES:
+        raise unknown("reference", reference, REFERENCES)
+    seen = digest(scene)
+    return [
+        Spec(scene.name, seen, method, vars(make_method(method, knobs)), step, size, reference)
+        for method in dict.fromkeys(methods or METHODS)
+        for step, knobs in enumerate(METHODS[method].sweep)
+    ]
+
+
+def _key(run: Run) -> str:
+    return json.dumps([run[name] for name in _SAME], sort_keys=True)
+
+
+def _prepared(folder: Path) -> Path:
+    """The file of a folder, made where it is missing; what was cut off at its end is dropped."""
+    path = folder / FILE
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with path.open("a+b") as file:
+            file.seek(0)
+            whole = file.read()
+            file.truncate(whole.rfind(b"\n") + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    return path
+
+
+def _append(path: Path, run: Run) -> None:
+    """One write, so that a line is there as a whole or not at all, also where several processes append."""
+    line = json.dumps(run, ensure_ascii=False, allow_nan=False) + "\n"
+    file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        os.write(file, line.encode())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        os.close(file)
+
+
+@contextmanager
+def _here() -> Iterator[Place]:
+    """Runs in this process."""
+    from wgsss.study.run import adapter, measure
+
+    yield {adapter()}, lambda todo: (measure(scene, spec) for scene, spec in todo)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Place]:
+    """Runs on the workers of a Dask cluster, each scene sent once. Left early, what is still to do is called off."""
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise InputError("a scheduler needs Dask: install wgsss[cluster]") from None
+    from wgsss.study.run import adapter, measure
+
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no Dask scheduler at '{address}' ({' '.join(str(error).split())})") from None
+
+    def runs(todo: Sequence[Task]) -> Iterator[Run]:
+        sent = {id(scene): client.scatter(scene) for scene in {id(scene): scene for scene, _ in todo}.values()}
+        for future in as_completed([client.submit(measure, sent[id(scene)], spec, pure=False) for scene, spec in todo]):
+            yield future.result()
+
+    with client:
+        adapters = set(client.run(adapter).values())
+        if not adapters:
+            raise InputError(f"the Dask cluster at '{address}' has no workers")
+        yield adapters, runs

@@ -1,0 +1,190 @@
+"use strict";
+const WIDTH = 470, HEIGHT = 390, LEFT = 62, RIGHT = 14, TOP = 12, BOTTOM = 46;
+const percent = v => `${+(100 * v).toPrecision(3)} %`, plain = v => `${+v.toPrecision(4)}`;
+// Less is better in all but `up`; `of` gives null where a run has no such figure, or one that the scale cannot show.
+const METRICS = {
+  rel_rmse: { name: "relative RMSE of M", of: e => e.rel_rmse > 0 ? e.rel_rmse : null, log: true, form: percent },
+  flip: { name: "FLIP of the picture", of: e => e.flip > 0 ? e.flip : null, log: true, form: plain },
+  bias: { name: "bias of M, either way", of: e => e.bias !== null && e.bias !== 1 ? Math.abs(e.bias - 1) : null, log: true, form: percent },
+  psnr: { name: "PSNR, dB", of: e => e.psnr, log: false, up: true, form: plain },
+};
+const hidden = new Set();
+let metric = METRICS.rel_rmse;
+const get = id => document.getElementById(id);
+
+function svg(parent, tag, attributes, text) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  if (text !== undefined) made.textContent = text;
+  return parent.appendChild(made);
+}
+
+function html(parent, tag, text, attributes = {}) {
+  const made = Object.assign(document.createElement(tag), attributes);
+  if (text !== undefined) made.textContent = text;
+  return parent.appendChild(made);
+}
+
+const colour = method => DATA.methods[method].colour === "#000000" ? "var(--ink)" : DATA.methods[method].colour;
+
+function shape(method, x, y, r) {
+  const [corners, star, turn] = DATA.methods[method].shape;
+  const points = [], steps = star ? 2 * corners : corners;
+  for (let i = 0; i < steps; i++) {
+    const angle = 2 * Math.PI * i / steps - Math.PI / 2 - turn * Math.PI / 180, reach = star && i % 2 ? 0.5 * r : r;
+    points.push(`${(x + reach * Math.cos(angle)).toFixed(2)},${(y + reach * Math.sin(angle)).toFixed(2)}`);
+  }
+  return points.join(" ");
+}
+
+function ticks(low, high, log) {
+  let found = [];
+  if (!log) {
+    const step = [1, 2, 5, 10, 20, 50].find(s => (high - low) / s <= 7) ?? 100;
+    for (let v = Math.ceil(low / step) * step; v <= high; v += step) found.push(v);
+    return found;
+  }
+  for (const mantissas of [[1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9], [1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
+    found = [];
+    for (let d = Math.floor(Math.log10(low)); d <= Math.ceil(Math.log10(high)); d++)
+      for (const m of mantissas) if (m * 10 ** d >= low && m * 10 ** d <= high) found.push(m * 10 ** d);
+    if (found.length <= 7) break;
+  }
+  return found;
+}
+
+function scale(values, from, to, log) {
+  const f = log ? Math.log10 : v => v, back = log ? v => 10 ** v : v => v;
+  const a = f(Math.min(...values)), b = f(Math.max(...values)), pad = 0.1 * Math.max(b - a, log ? 0.5 : 5);
+  const at = v => from + (f(v) - a + pad) / (b - a + 2 * pad) * (to - from);
+  return Object.assign(at, { low: back(a - pad), high: back(b + pad), ticks: ticks(back(a - pad), back(b + pad), log) });
+}
+
+// Of points {x, y}, those that no other one beats, by x.
+function front(points) {
+  const found = [], order = [...points].sort((p, q) => p.x - q.x || p.y - q.y);
+  for (const p of order) {
+    const last = found.at(-1);
+    if (!last || p.y < last.y || (p.x === last.x && p.y === last.y)) found.push(p);
+  }
+  return found;
+}
+
+function draw() {
+  get("tip").hidden = true;
+  get("panels").replaceChildren();
+  for (const panel of DATA.panels) drawPanel(panel);
+}
+
+function drawPanel(panel) {
+  const section = html(get("panels"), "section");
+  html(section, "h2", panel.title);
+  const picture = svg(section, "svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "group", "aria-label": panel.title });
+  const shown = panel.runs.filter(run => metric.of(run.error) !== null);
+  const runs = shown.filter(run => !hidden.has(run.method));
+  if (!runs.length) return void svg(picture, "text", { x: WIDTH / 2, y: HEIGHT / 2, "text-anchor": "middle" }, "nothing to show");
+  const floor = metric === METRICS.rel_rmse ? panel.floor : 0;
+  const x = scale(shown.flatMap(run => [run.frame_ms, ...run.frame_ms_quartiles]), LEFT, WIDTH - RIGHT, true);
+  const errors = shown.map(run => metric.of(run.error)).concat(floor > 0 ? [floor] : []);
+  const y = scale(errors, HEIGHT - BOTTOM, TOP, metric.log);
+  const bottom = HEIGHT - BOTTOM;
+  if (floor > 0) {
+    svg(picture, "rect", { class: "floor", x: LEFT, y: y(floor), width: WIDTH - RIGHT - LEFT, height: bottom - y(floor) });
+    svg(picture, "text", { x: LEFT + 6, y: y(floor) + 15 }, "the reference's own error");
+  }
+  for (const v of x.ticks) {
+    svg(picture, "line", { class: "grid", x1: x(v), x2: x(v), y1: TOP, y2: bottom });
+    svg(picture, "text", { x: x(v), y: bottom + 17, "text-anchor": "middle" }, plain(v));
+  }
+  for (const v of y.ticks) {
+    svg(picture, "line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: y(v), y2: y(v) });
+    svg(picture, "text", { x: LEFT - 7, y: y(v) + 4, "text-anchor": "end" }, metric.form(v));
+  }
+  svg(picture, "text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, "frame time, ms");
+  svg(picture, "text", { transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, metric.name);
+
+  const points = runs.map(run => ({ run, x: run.frame_ms, y: (metric.up ? -1 : 1) * metric.of(run.error) }));
+  const best = front(points), at = point => [x(point.x), y(Math.abs(point.y))];
+  const steps = best.map(p => `H${x(p.x)}V${y(metric.of(p.run.error))}`);
+  svg(picture, "path", { class: "front", d: `M${x(best[0].x)} ${metric.up ? bottom : TOP}${steps.join("")}H${WIDTH - RIGHT}` });
+  for (const method of new Set(runs.map(run => run.method))) {
+    const own = runs.filter(run => run.method === method), places = own.map(run => [x(run.frame_ms), y(metric.of(run.error))]);
+    svg(picture, "polyline", { class: "sweep", points: places.join(" "), stroke: colour(method) });
+  }
+  const taken = points.map(point => around(...at(point)));
+  for (const point of points) {
+    const [cx, cy] = at(point), kept = best.includes(point), { run } = point, paint = colour(run.method);
+    const [low, high] = run.frame_ms_quartiles;
+    svg(picture, "line", { class: "spread", x1: x(low), x2: x(high), y1: cy, y2: cy, stroke: paint });
+    const look = kept ? { fill: paint, stroke: "var(--card)" } : { fill: "var(--card)", stroke: paint };
+    const says = `${run.method} ${knobs(run)}: ${plain(run.frame_ms)} ms, ${metric.name} ${metric.form(metric.of(run.error))}`;
+    const mark = svg(picture, "polygon", {
+      class: kept ? "run best" : "run", points: shape(run.method, cx, cy, kept ? 7.5 : 5.5), tabindex: 0, role: "img",
+      "aria-label": says, "data-method": run.method, ...look,
+    });
+    for (const event of ["pointerenter", "focus"]) mark.addEventListener(event, () => tell(run, mark));
+    for (const event of ["pointerleave", "blur"]) mark.addEventListener(event, () => { get("tip").hidden = true; });
+  }
+  for (const point of points) label(picture, point.run.label, ...at(point), taken);
+}
+
+const around = (cx, cy) => ({ left: cx - 6, right: cx + 6, top: cy - 6, bottom: cy + 6 });
+
+// Beside its mark, where it covers no other label and no mark; where there is no room, nowhere.
+function label(picture, text, cx, cy, taken) {
+  if (!text) return;
+  const made = svg(picture, "text", { class: "label" }, text);
+  const places = [[9, -7, "start"], [9, 16, "start"], [-9, -7, "end"], [-9, 16, "end"], [0, -13, "middle"], [0, 22, "middle"],
+    [14, 4, "start"], [-14, 4, "end"], [18, -20, "start"], [-18, 28, "end"], [-18, -20, "end"], [18, 28, "start"]];
+  for (const [dx, dy, anchor] of places) {
+    for (const [name, value] of Object.entries({ x: cx + dx, y: cy + dy, "text-anchor": anchor })) made.setAttribute(name, value);
+    const { x, y, width, height } = made.getBBox(), box = { left: x, right: x + width, top: y, bottom: y + height };
+    const inside = x >= LEFT && box.right <= WIDTH - RIGHT && y >= TOP && box.bottom <= HEIGHT - BOTTOM;
+    const free = !taken.some(t => box.left < t.right && t.left < box.right && box.top < t.bottom && t.top < box.bottom);
+    if (inside && free) return void taken.push(box);
+  }
+  made.remove();
+}
+
+const knobs = run => Object.entries(run.knobs).map(([knob, value]) => `${knob} ${value}`).join(", ");
+
+function tell(run, mark) {
+  const tip = get("tip"), table = document.createElement("table");
+  const row = (name, value, kind = "") => {
+    const made = html(table, "tr", undefined, { className: kind });
+    html(made, "td", name);
+    html(made, "td", value);
+  };
+  const [low, high] = run.frame_ms_quartiles, { rel_rmse, psnr, flip, bias } = run.error;
+  const or = (value, form) => value === null ? "–" : form(value);
+  row("frame", `${plain(run.frame_ms)} ms (${plain(low)} to ${plain(high)}, ${run.frames} frames)`);
+  for (const [name, ms] of Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6)) row(name, `${plain(ms)} ms`, "sub");
+  row("bake", `${plain(run.bake_ms)} ms${run.bake_cached ? " from the cache" : ""}`);
+  row("memory", `${plain(run.bytes / 2 ** 20)} MiB`);
+  row("relative RMSE", or(rel_rmse, percent));
+  row("the reference's own", or(run.floor, percent), "sub");
+  row("PSNR", or(psnr, v => `${plain(v)} dB`));
+  row("FLIP", or(flip, plain));
+  row("bias", or(bias, plain));
+  row("measured", `${run.date.slice(0, 10)}, ${run.version}`, "sub");
+  tip.replaceChildren();
+  html(tip, "b", [run.method, knobs(run)].filter(Boolean).join(", "));
+  tip.append(table);
+  tip.hidden = false;
+  const place = mark.getBoundingClientRect(), size = tip.getBoundingClientRect();
+  tip.style.left = `${Math.max(4, place.right + 12 + size.width < innerWidth ? place.right + 12 : place.left - 12 - size.width)}px`;
+  tip.style.top = `${Math.max(4, Math.min(place.top - 20, innerHeight - size.height - 4))}px`;
+}
+
+for (const method of Object.keys(DATA.methods)) {
+  const choice = html(get("methods"), "label");
+  const box = html(choice, "input", undefined, { type: "checkbox", checked: true, value: method });
+  const swatch = svg(choice, "svg", { width: 16, height: 16, viewBox: "0 0 16 16", style: "width: 16px", "aria-hidden": "true" });
+  svg(swatch, "polygon", { points: shape(method, 8, 8, 7), fill: colour(method) });
+  choice.append(method);
+  box.addEventListener("change", () => { hidden[box.checked ? "delete" : "add"](method); draw(); });
+}
+for (const [key, { name }] of Object.entries(METRICS)) html(get("metric"), "option", name, { value: key });
+get("metric").addEventListener("change", event => { metric = METRICS[event.target.value]; draw(); });
+get("caption").textContent = DATA.caption;
+draw();
