@@ -173,7 +173,7 @@ def _run(name: str, method: Method, scene: Scene, size: tuple[int, int], time: f
 
 
 def footprint(graph: Graph) -> int:
-    """Bytes of textures and buffers that a graph needed when it ran: what persists, and most transients live at once."""
+    """Bytes of textures and buffers that a graph needed as it ran: what persists, and most transients live at once."""
     persistent = {id(held): held for item in graph.ran for held in item.imports.values()}
     return graph.peak_bytes + sum(_nbytes(held) for held in persistent.values())
 

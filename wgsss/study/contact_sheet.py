@@ -8,88 +8,108 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.study import error_maps
+from wgsss.study import error_maps, tables
 from wgsss.study.compare import Comparison, Run
-from wgsss.study.metrics import over_black
-from wgsss.study.tables import measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = npt.NDArray[Any]
 
-_PAPER, _INK, _FAINT, _MARK = "#16161a", "#f2f2f4", "#a0a0aa", "#5fd0ff"
-_CELL = 2.6  # inches
+_PAPER, _BEHIND, _INK, _FAINT, _MARK = "#16161a", "#2b2b31", "#f2f2f4", "#a0a0aa", "#5fd0ff"
+# Inches.
+_CELL, _GAP, _EDGE, _HEAD, _WORDS = 2.7, 0.1, 0.25, 0.62, 1.65
 
 
 def draw(comparison: Comparison, path: Path) -> None:
-    """Write the sheet, a PNG: a row for each method, below the reference's."""
+    """Write the sheet, a PNG: a row for the reference with its own error, and one for each method."""
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpec
 
-    rows, aspect = len(comparison.runs), comparison.size[0] / comparison.size[1]
-    wide = _CELL * min(max(aspect, 0.6), 2.2)
-    width, height = 1.75 + 2 * wide + 2 * _CELL, 0.62 + rows * (wide / aspect + 0.12) + 0.75
+    aspect = comparison.size[0] / comparison.size[1]
+    wide, high = (_CELL, _CELL / aspect) if aspect > 1.0 else (_CELL * aspect, _CELL)
+    columns = [_WORDS, wide, wide, high, high]
+    width = sum(columns) + 4 * _GAP + 2 * _EDGE
+    height = _HEAD + (len(comparison.runs) + 1) * (high + _GAP) + 0.25 + _EDGE
     figure = Figure(figsize=(width, height), facecolor=_PAPER)
-    grid = GridSpec(
-        rows,
-        5,
-        figure,
-        left=0.02,
-        right=0.99,
-        top=1 - 0.80 / height,
-        bottom=0.62 / height,
-        wspace=0.04,
-        hspace=0.05,
-        width_ratios=[1.55, wide, wide, _CELL, _CELL],
-    )
-    end, found = error_maps.top([comparison]), error_maps.maps(comparison)
-    for row, run in enumerate(comparison.runs):
-        axes = [figure.add_subplot(grid[row, column]) for column in range(5)]
-        _row(axes, comparison, run, found[run.name], end)
-        if row == 0:
-            for axis, text in zip(axes[1:], _headings(comparison), strict=True):
-                axis.set_title(text, color=_FAINT, fontsize=9.5)
-    title = f"{comparison.scene} against {comparison.reference}"
-    figure.text(0.02, 1 - 0.16 / height, title, color=_INK, fontsize=15, va="top", weight="bold")
-    caption = f"{comparison.size[0]} x {comparison.size[1]}, {comparison.adapter}"
-    figure.text(0.99, 1 - 0.2 / height, caption, color=_FAINT, fontsize=9, va="top", ha="right")
-    _colour_bar(figure.add_axes((0.36, 0.40 / height, 0.44, 0.12 / height)), end)
+
+    def axes(row: int) -> list[Axes]:
+        lefts = _EDGE + np.cumsum([0.0, *columns[:-1]]) + _GAP * np.arange(5)
+        bottom = height - _HEAD - high - row * (high + _GAP) - (0.25 if row else 0.0)
+        return [
+            figure.add_axes((left / width, bottom / height, across / width, high / height))
+            for left, across in zip(lefts, columns, strict=True)
+        ]
+
+    end, found = error_maps.top(comparison), error_maps.maps(comparison)
+    _reference(axes(0), comparison, end)
+    for row, run in enumerate(comparison.runs, start=1):
+        _method(axes(row), comparison, run, found[run.name], end, titled=row == 1)
+    _words(figure, comparison, width, height)
     figure.savefig(path, dpi=120, facecolor=_PAPER, format="png")
 
 
-def _headings(comparison: Comparison) -> tuple[str, ...]:
-    return "picture", "error", "where it errs most", f"{comparison.reference} there"
+def _words(figure: Figure, comparison: Comparison, width: float, height: float) -> None:
+    title = f"{comparison.scene} against {comparison.reference}"
+    figure.text(_EDGE / width, 1 - 0.2 / height, title, color=_INK, fontsize=15, va="top", weight="bold")
+    caption = f"{comparison.size[0]} x {comparison.size[1]}, {comparison.adapter}"
+    figure.text(1 - _EDGE / width, 1 - 0.25 / height, caption, color=_FAINT, fontsize=8.5, va="top", ha="right")
 
 
-def _row(axes: list[Axes], comparison: Comparison, run: Run, error: Array, end: float) -> None:
+def _reference(axes: list[Axes], comparison: Comparison, end: float) -> None:
+    own = error_maps.coloured(error_maps.own(comparison), comparison.seen, end)
+    _label(axes[0], comparison.reference, {"rel RMSE": tables.percent(comparison.runs[0].errors.floor)})
+    _picture(axes[1], comparison.image.display)
+    _picture(axes[2], own)
+    axes[1].set_title("picture", color=_FAINT, fontsize=9, pad=4)
+    axes[2].set_title("its own error", color=_FAINT, fontsize=9, pad=4)
+    for axis in axes[3:]:
+        axis.set_axis_off()
+    bar = axes[3].figure.add_axes(_between(axes[3], axes[4]))
+    bar.imshow(error_maps.bar(), aspect="auto", extent=(0.0, 1.0, 0.0, 1.0))
+    bar.set_xticks(*map(list, zip(*error_maps.ticks(end), strict=True)))
+    bar.set_yticks([])
+    bar.tick_params(colors=_FAINT, labelsize=8, length=2)
+    text = "error: luminance of |M - reference|\nover the reference's root mean square"
+    bar.set_title(text, color=_FAINT, fontsize=9, pad=6, loc="left")
+
+
+def _between(left: Axes, right: Axes) -> tuple[float, float, float, float]:
+    """A place for the colour bar over two cells."""
+    one, other = left.get_position(), right.get_position()
+    span = other.x1 - one.x0
+    return one.x0 + 0.06 * span, one.y0 + 0.42 * one.height, 0.88 * span, 0.06 * one.height
+
+
+def _method(axes: list[Axes], comparison: Comparison, run: Run, error: Array, end: float, titled: bool) -> None:
     from matplotlib.patches import Rectangle
 
     x, y, side = error_maps.worst(error, comparison.seen)
     crop = np.s_[y : y + side, x : x + side]
-    picture, truth = over_black(run.image.display), over_black(comparison.image.display)
-    shown = (picture, over_black(error_maps.coloured(error, comparison.seen, end)), picture[crop], truth[crop])
-    for axis, pixels in zip(axes[1:], shown, strict=True):
-        axis.imshow(pixels, interpolation="nearest" if pixels.shape[0] < 200 else "auto")
-    for axis in axes:
-        axis.set_xticks([])
-        axis.set_yticks([])
-        for spine in axis.spines.values():
-            spine.set_visible(False)
+    _label(axes[0], run.name, tables.measures(run))
+    _picture(axes[1], run.image.display)
+    _picture(axes[2], error_maps.coloured(error, comparison.seen, end))
+    _picture(axes[3], run.image.display[crop])
+    _picture(axes[4], comparison.image.display[crop])
     for axis in axes[1:3]:
         axis.add_patch(Rectangle((x - 0.5, y - 0.5), side, side, fill=False, lw=1.0, edgecolor=_MARK))
-    axes[0].set_facecolor(_PAPER)
-    axes[0].text(0.0, 0.93, run.name.replace(" ", "\n"), color=_INK, fontsize=13, weight="bold", va="top")
-    lines = "\n".join(f"{name:<9}{value}" for name, value in measures(run).items())
-    axes[0].text(0.0, 0.07, lines, color=_FAINT, fontsize=8.5, va="bottom", family="monospace", linespacing=1.5)
+    if titled:
+        titles = ("picture", "error", "where it errs most", f"{comparison.reference} there")
+        for axis, title in zip(axes[1:], titles, strict=True):
+            axis.set_title(title, color=_FAINT, fontsize=9, pad=4)
 
 
-def _colour_bar(axis: Axes, end: float) -> None:
-    axis.imshow(error_maps.bar(), aspect="auto", extent=(0.0, 1.0, 0.0, 1.0))
-    ticks = error_maps.ticks(end)
-    axis.set_xticks([(t / end) ** error_maps.CURVE for t in ticks], [f"{t:.3g}" for t in ticks])
+def _label(axis: Axes, name: str, lines: dict[str, str]) -> None:
+    axis.set_axis_off()
+    axis.text(0.0, 1.0, name.replace(" ", "\n"), color=_INK, fontsize=13, weight="bold", va="top")
+    text = "\n".join(f"{key:<9}{value}" for key, value in lines.items())
+    axis.text(0.0, 0.0, text, color=_FAINT, fontsize=8, va="bottom", family="monospace", linespacing=1.5)
+
+
+def _picture(axis: Axes, pixels: Array) -> None:
+    axis.imshow(pixels, interpolation="nearest")
+    axis.set_facecolor(_BEHIND)
+    axis.set_xticks([])
     axis.set_yticks([])
-    axis.tick_params(colors=_FAINT, labelsize=8, length=2)
-    axis.set_title(
-        "luminance of |M - reference|, over the reference's root mean square", color=_FAINT, fontsize=9, pad=4
-    )
+    for spine in axis.spines.values():
+        spine.set_visible(False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -32,19 +31,19 @@ def own(comparison: Comparison) -> Array:
     return error_map(truth.M + truth.error, truth.M, comparison.seen)
 
 
-def top(found: Iterable[Comparison]) -> float:
+def top(comparison: Comparison) -> float:
     """The end of a scale that holds the errors of all runs, but for a few pixels: a number that reads well."""
-    values = [np.percentile(values[c.seen], _COVERED) for c in found for values in maps(c).values()]
-    most = max(values, default=0.0)
+    seen = comparison.seen
+    most = max((float(np.percentile(values[seen], _COVERED)) for values in maps(comparison).values()), default=0.0)
     if most <= 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(most))
     return float(next(n * decade for n in _NICE if n * decade >= 0.999 * most))
 
 
-def ticks(end: float) -> list[float]:
-    """Errors to mark on the colour bar."""
-    return [0.0, end / 16.0, end / 4.0, end * 9.0 / 16.0, end]
+def ticks(end: float) -> list[tuple[float, str]]:
+    """What to mark on the colour bar: places from 0 to 1, and the errors there."""
+    return [(share**CURVE, f"{100.0 * share * end:.3g} %") for share in (0.0, 1 / 16, 1 / 4, 9 / 16, 1.0)]
 
 
 def coloured(values: Array, seen: Array, end: float) -> Array:

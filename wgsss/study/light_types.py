@@ -36,7 +36,7 @@ def light_types(scene: Scene, time: float = 0.0) -> dict[str, Scene]:
     up = (0.0, 0.0, 1.0) if abs(towards[1]) > 0.9 else (0.0, 1.0, 0.0)
     side = _SIDE * radius
     away: Any = tuple(-towards)
-    unit: dict[str, Light] = {
+    unit: dict[str, Any] = {
         "directional": DirectionalLight(away, (1.0, 1.0, 1.0)),
         "point": PointLight(place, (1.0, 1.0, 1.0)),
         "area": RectLight(place, away, up, side, side, (1.0, 1.0, 1.0)),
@@ -47,7 +47,7 @@ def light_types(scene: Scene, time: float = 0.0) -> dict[str, Scene]:
     found = {}
     for name, light in unit.items():
         scale = wanted / (mean_irradiance(posed, (light,)) or 1.0)
-        lit: Any = replace(light, **{power[name]: (scale,) * 3})
+        lit = replace(light, **{power[name]: (scale,) * 3})
         found[name] = replace(scene, name=f"{scene.name}, {name}", lights=(lit,))
     return found
 
@@ -56,17 +56,17 @@ def mean_irradiance(scene: Scene, lights: Sequence[Light]) -> float:
     """W/m^2, over the surface of a still scene and the channels, without shadows."""
     position, normal, area = _triangles(scene)
     total = np.zeros(3)
-    for light in emitters(lights, np.concatenate([o.placed for o in scene.objects])).lights:
-        to_light = np.asarray(light["position"], np.float64)
+    for emitter in emitters(lights, np.concatenate([o.placed for o in scene.objects])).lights:
+        to_light = np.asarray(emitter["position"], np.float64)
         distance = np.ones(len(position))  # m
-        if light["kind"] != DIRECTIONAL:
+        if emitter["kind"] != DIRECTIONAL:
             to_light = to_light - position
             length = np.linalg.norm(to_light, axis=1)
             to_light, distance = to_light / length[:, None], length / 1000.0
         facing = np.maximum(np.sum(normal * to_light, axis=1), 0.0)
-        if light["kind"] == PATCH:
-            facing *= np.maximum(-np.sum(to_light * light["normal"], axis=1), 0.0)
-        total += np.average(facing / np.square(distance), weights=area) * np.asarray(light["power"])
+        if emitter["kind"] == PATCH:
+            facing *= np.maximum(-np.sum(to_light * emitter["normal"], axis=1), 0.0)
+        total += np.average(facing / np.square(distance), weights=area) * np.asarray(emitter["power"])
     for light in lights:
         if isinstance(light, EnvironmentLight):
             pixels = light.pixels().astype(np.float64)

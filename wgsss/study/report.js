@@ -50,6 +50,11 @@ function fill() {
   }
   table(byId("figures"), light.figures, 1);
   byId("floor").textContent = light.floor;
+  byId("ticks").replaceChildren(...light.ticks.map(([at, text]) => {
+    const mark = make("span", { textContent: text });
+    mark.style.left = 100 * at + "%";
+    return mark;
+  }));
   const cards = new Map();
   light.images.forEach((image, i) => {
     const view = make("div", { className: "view" }, make("img", { src: image.source, alt: image.title, draggable: false }));
@@ -197,12 +202,7 @@ byId("about").textContent = data.about;
 byId("versions").textContent = data.versions;
 root.setProperty("--aspect", width + " / " + height);
 root.setProperty("--ratio", width / height);
-byId("bar").src = data.scale.bar;
-for (const tick of data.scale.ticks) {
-  const mark = make("span", { textContent: tick.text });
-  mark.style.left = 100 * tick.at + "%";
-  byId("ticks").append(mark);
-}
+byId("bar").src = data.bar;
 if (data.causes) {
   byId("causes-part").hidden = false;
   bars(data.causes);

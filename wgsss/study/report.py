@@ -41,7 +41,7 @@ def write_report(comparison: Comparison, folder: Path) -> list[Path]:
         (place / "metrics.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
         (place / "report.html").write_text(page(comparison), encoding="utf-8")
         contact_sheet.draw(comparison, place / "contact_sheet.png")
-        end = error_maps.top([comparison])
+        end = error_maps.top(comparison)
         found = error_maps.maps(comparison)
         for name, image in _named_images(comparison):
             for ending in (".png", ".exr"):
@@ -88,23 +88,21 @@ def versions() -> dict[str, str]:
 def _data(comparison: Comparison) -> dict[str, Any]:
     """What the page shows."""
     everything = {OWN: comparison, **comparison.lights}
-    end = error_maps.top(everything.values())
-    ticks = [{"at": (t / end) ** error_maps.CURVE, "text": tables.percent(t)} for t in error_maps.ticks(end)]
     width, height = comparison.size
     return {
         "title": f"{comparison.scene} against {comparison.reference}",
         "about": f"{width} x {height} pixels · {comparison.adapter}",
         "versions": " · ".join(f"{name} {number}" for name, number in versions().items()),
         "size": [width, height],
-        "scale": {"bar": _uri(error_maps.bar()), "ticks": ticks},
-        "lights": [_light(name, other, end) for name, other in everything.items()],
+        "bar": _uri(error_maps.bar()),
+        "lights": [_light(name, other) for name, other in everything.items()],
         "by_light": tables.by_light(comparison) if comparison.lights else [],
         "causes": _causes(comparison) if comparison.causes else None,
     }
 
 
-def _light(name: str, comparison: Comparison, end: float) -> dict[str, Any]:
-    truth = comparison.reference
+def _light(name: str, comparison: Comparison) -> dict[str, Any]:
+    truth, end = comparison.reference, error_maps.top(comparison)
     images = [{"name": truth, "title": truth, "note": "reference", "source": _uri(comparison.image.display)}]
     for run in comparison.runs:
         note = tables.percent(run.errors.rel_rmse)
@@ -113,7 +111,13 @@ def _light(name: str, comparison: Comparison, end: float) -> dict[str, Any]:
     for key, values in {truth: own, **error_maps.maps(comparison)}.items():
         source = _uri(error_maps.coloured(values, comparison.seen, end))
         images.append({"name": key, "title": f"{key}: {'its own ' if key == truth else ''}error", "source": source})
-    return {"name": name, "images": images, "figures": tables.by_method(comparison), "floor": tables.floor(comparison)}
+    return {
+        "name": name,
+        "images": images,
+        "ticks": error_maps.ticks(end),
+        "figures": tables.by_method(comparison),
+        "floor": tables.floor(comparison),
+    }
 
 
 def _causes(comparison: Comparison) -> dict[str, Any]:
