@@ -29,7 +29,11 @@ GOLDENS, FAILED = ROOT / "goldens", ROOT / "out" / "goldens"
 
 SIZE = (128, 128)
 VERTICES = {"milk": 5000, "statue": 5000}  # the least that they can have; 2000 for the others
-KNOBS: dict[str, dict[str, Any]] = {"deon07": {"map_size": 256}}
+KNOBS: dict[str, dict[str, Any]] = {
+    "deon07": {"map_size": 256},
+    "jensen02": {"spacing": 6.0},
+    "crowd jensen02": {"spacing": 20.0},  # heads are large beside what skin scatters over
+}
 TIME_S = 0.7  # what moves is not at rest
 
 ADAPTER = "wgsss.adapter"  # the label of a golden that tells what drew it
@@ -61,7 +65,7 @@ def load(scene: str) -> Scene:
 
 
 def draw(gpu: Gpu, scene: str, method: str) -> Image:
-    renderer = Renderer(load(scene), make_method(method, KNOBS.get(method)), SIZE, gpu)
+    renderer = Renderer(load(scene), make_method(method, KNOBS.get(f"{scene} {method}", KNOBS.get(method))), SIZE, gpu)
     image = renderer.frame(TIME_S, timed=False)
     return replace(image, metadata={**image.metadata, "adapter": gpu.name})
 

@@ -8,9 +8,10 @@ from typing import Any
 from wgsss.errors import InputError, unknown
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
+from wgsss.methods.point_cloud import PointCloud
 from wgsss.methods.texture_space import TextureSpace
 
-METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace}
+METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace, "jensen02": PointCloud}
 
 
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:

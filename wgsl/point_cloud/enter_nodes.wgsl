@@ -1,0 +1,39 @@
+// What the nodes of one height in the octree stand for, from their children.
+
+import package::point_cloud::tree::{Node, Entering, brightness, farthest};
+import package::units::{Number};
+
+struct Params {
+    epsilon: Number, // of Mikkelsen 2009, eq. 42
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> nodes: array<Node>;
+@group(0) @binding(2) var<storage, read> chosen: array<u32>; // the nodes of this height
+@group(0) @binding(3) var<storage, read_write> entering: array<Entering>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&chosen) {
+        return;
+    }
+    let k = chosen[id.x];
+    let node = nodes[k];
+    var flux = vec3f(0.0);
+    var moment = vec3f(0.0);
+    var normal = vec3f(0.0);
+    for (var child = k + 1u; child < node.next; child = nodes[child].next) {
+        let below = entering[child];
+        let weight = brightness(below.flux);
+        flux += below.flux;
+        moment += weight * (below.position - node.centre);
+        normal += weight * below.normal;
+    }
+    let lit = brightness(flux) > 0.0; // nothing comes from a dark node, wherever it is
+    let weight = select(1.0, brightness(flux), lit);
+    let position = node.centre + moment / weight;
+    let radius = farthest(node, position);
+    // A node that x_o lies in is never small enough.
+    let reach = max(sqrt(node.area) / params.epsilon, radius);
+    entering[k] = Entering(position, reach, flux, node.next, normal / weight, radius);
+}
