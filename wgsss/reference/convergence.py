@@ -27,10 +27,13 @@ _POINTS = 1 << 18  # whose L_d one pass gathers
 
 
 def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float, samples: int) -> SimpleNamespace:
-    """front, back and error (N, 3) of M at places on a body, without the base colour after diffusion, by samples dense
-    enough for a change within `tolerance`, RMS, or as many as there may be; then a `note` says so."""
+    """front, back and error (N, 3) of M at places on a body, without the base colour after diffusion.
+
+    By samples dense enough for a change within `tolerance`, RMS, or by as many as there may be: then a `note` says so.
+    """
     L_d = irradiance_at(body, receivers)
-    spacing = _first_spacing(body.mesh, profile)
+    width = float(profile.range(_RESOLVED).max()) if profile.total.any() else np.inf
+    spacing = _first_spacing(body.mesh, width / RADIUS, samples)
     last = at_spacing(body, receivers, L_d, profile, spacing)
     while True:
         spacing /= 2
@@ -38,11 +41,12 @@ def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float
         found.error = np.abs(found.front + found.back - last.front - last.back)
         size = np.sqrt(np.square(found.front + found.back).mean(axis=0))
         moved = float((np.sqrt(np.square(found.error).mean(axis=0)) / np.where(size > 0, size, 1.0)).max())
-        enough = moved <= tolerance
-        if enough or _count(body.mesh, spacing / 2) > samples:
-            at_most = f"from {last.samples} to {found.samples} samples, and no more than {samples} may be taken"
-            what = f"{body.material.name} on {body.mesh.name}"
-            found.note = "" if enough else f"{what}: M still moves by {100 * moved:.2g} % {at_most}"
+        resolved = RADIUS * spacing <= width
+        if (enough := moved <= tolerance and resolved) or _count(body.mesh, spacing / 2) > samples:
+            change = f"still moves by {100 * moved:.2g} % from {last.samples} to {found.samples} samples"
+            why = change if resolved else f"is of samples {spacing:.2g} mm apart, too far for the material"
+            note = f"{body.material.name} on {body.mesh.name}: M {why}, and no more than {samples} may be taken"
+            found.note = "" if enough else note
             return found
         last = found
 
@@ -66,19 +70,25 @@ def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spa
     return SimpleNamespace(front=front + kernel.near * L_d, back=back, samples=len(flux))
 
 
-def _first_spacing(mesh: Mesh, profile: Profile) -> float:
-    """The widest spacing, mm, that is worth a try: a sample a face or more, and the profile's width told apart."""
-    corners = mesh.positions[mesh.faces].astype(np.float64)
-    longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
-    width = float(profile.range(_RESOLVED).max())
-    return min(longest, width / RADIUS) if width > 0.0 else longest
+def _first_spacing(mesh: Mesh, widest: float, samples: int) -> float:
+    """The spacing, mm, to begin with: `widest`, where that leaves a sample to each face and may be halved."""
+    longest = float(_longest_edges(mesh).max())
+    spacing = min(longest, widest)
+    while spacing < longest and _count(mesh, spacing / 2) > samples:
+        spacing = min(longest, spacing * 1.1)
+    return spacing
 
 
 def _count(mesh: Mesh, spacing: float) -> int:
     """How many samples at `spacing` mm are."""
+    return int(np.square(np.maximum(np.ceil(_longest_edges(mesh) / spacing), 1)).sum())
+
+
+def _longest_edges(mesh: Mesh) -> Array:
+    """The length (F,) of each face's longest edge, mm."""
     corners = mesh.positions[mesh.faces].astype(np.float64)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    return int(np.square(np.maximum(np.ceil(longest / spacing), 1)).sum())
+    edges: Array = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return edges
 
 
 def irradiance_at(body: Body, places: Samples) -> Array:

@@ -1,0 +1,280 @@
+"""The surface integral by brute force against closed forms, and what it does when it is stopped or cannot converge."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scenes import ABOVE, MATTE, lit, plane
+from scipy.integrate import quad
+
+from wgsss.bake.samples import Samples
+from wgsss.gpu import Gpu
+from wgsss.methods import make_method
+from wgsss.optics import SKIN_GAUSSIANS, NormalizedDiffusion, Profile, SumOfGaussians
+from wgsss.reference import REFERENCES, surface_sum
+from wgsss.reference.convergence import RADIUS, at_spacing, irradiance_at
+from wgsss.reference.integral import Integral, at_vertices, integral
+from wgsss.reference.kernel import make_kernel
+from wgsss.rendering import Renderer
+from wgsss.scene import (
+    DirectionalLight,
+    EnvironmentLight,
+    Mesh,
+    Object,
+    OrthographicCamera,
+    PointLight,
+    material,
+    shapes,
+)
+from wgsss.stage import Stage
+
+WIDE = SumOfGaussians(np.array([1.0, 4.0]), np.array([[0.3, 0.2, 0.1], [0.4, 0.3, 0.2]]))
+SOFT = replace(MATTE, gaussians=WIDE)
+BURLEY = NormalizedDiffusion((0.8, 0.5, 0.3), (0.5, 0.3, 0.2))
+SUN = DirectionalLight((0, -1, 0), (2.0, 2.0, 2.0))
+
+
+class Bar:
+    """What counts pairs, when nobody looks."""
+
+    n = 0
+
+    def update(self, n: int) -> None:
+        self.n += n
+
+
+def scattered(mesh: Mesh, count: int, seed: int = 0) -> Samples:
+    """Random places on a mesh."""
+    rng = np.random.default_rng(seed)
+    faces = rng.integers(0, len(mesh.faces), count).astype(np.int32)
+    return Samples(faces, rng.dirichlet([1, 1, 1], count), np.zeros(count))
+
+
+def rms(values: Any) -> Any:
+    return np.sqrt(np.square(values).mean(axis=0))
+
+
+@pytest.mark.parametrize("profile", [WIDE, SKIN_GAUSSIANS, BURLEY, material("skin1").profile])
+@pytest.mark.parametrize("radius", [0.1, 1.0])
+def test_a_kernel_holds_all_light(profile: Profile, radius: float) -> None:
+    """Over the plane: what is taken as near, against a quadrature, and with what is sampled the total."""
+    kernel = make_kernel(profile, radius, 1e9)
+    for channel in range(3):
+
+        def ring(r: float, channel: int = channel) -> float:
+            return float(2 * np.pi * r * profile.reflectance(r)[channel] * (1 - (r / radius) ** 2) ** 3)
+
+        near = quad(ring, 0, radius, limit=200, epsabs=1e-9)[0]
+        assert kernel.near[channel] == pytest.approx(near, abs=2e-5)
+    squares = ((kernel.first + np.arange(len(kernel.table), dtype=np.uint32)) << 15).view(np.float32).astype(float)
+    sampled = kernel.table[:, :3].astype(float) * kernel.table[:, 3:]
+    beyond = np.pi * np.trapezoid(sampled, squares, axis=0)
+    np.testing.assert_allclose(kernel.near + beyond, profile.total, atol=5e-5)
+
+
+def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
+    """70,000 samples, more than lavapipe's loops turn, in a box wider than the profile's range."""
+    rng = np.random.default_rng(1)
+    count, receivers = 70_000, 100
+    box = np.array([30.0, 3.0, 3.0])
+    samples = surface_sum.Points(
+        *(a.astype(np.float32) for a in (box * rng.random((count, 3)), rng.normal(size=(count, 3))))
+    )
+    places = surface_sum.Points(
+        *(a.astype(np.float32) for a in (box * rng.random((receivers, 3)), rng.normal(size=(receivers, 3))))
+    )
+    flux = rng.random((count, 3)).astype(np.float32)
+    radius = 0.2
+    kernel = make_kernel(WIDE, radius, 1e3)
+    assert kernel.reach < 12
+    found = surface_sum.surface_sum(gpu, kernel, samples, flux, places, Bar())
+    expected = np.zeros((2, receivers, 3))
+    for i in range(receivers):
+        d = samples.position.astype(float) - places.position[i]
+        facing = samples.normal.astype(float) @ places.normal[i]
+        r = np.linalg.norm(d, axis=1)
+        chi = np.where((r < radius) & (facing >= 0), (1 - np.minimum(r / radius, 1) ** 2) ** 3, 0)
+        M = WIDE.reflectance(r) * (1 - chi)[:, None] * flux
+        back = (d @ places.normal[i] < 0) & (facing < 0)
+        expected[:, i] = M[~back].sum(axis=0), M[back].sum(axis=0)
+    # Here and there the profile's range cuts off what falls behind it, 1e-5 of its light.
+    np.testing.assert_allclose(found, expected, rtol=5e-5)
+    again = surface_sum.surface_sum(gpu, kernel, samples, flux, places, Bar())
+    np.testing.assert_array_equal(found, again)
+
+
+def test_uniformly_lit_sphere(gpu: Gpu) -> None:
+    """A chord r away, a sphere has the area 2 pi r dr; what is opposed begins at sqrt(2) a. Moved and turned."""
+    a, at = 3.0, (30.0, -5.0, 2.0)
+    ball = Object(shapes.sphere(a, vertices=1500), replace(SOFT, specular=1.0), translate=at, rotate=(20, 30, 40))
+    camera = OrthographicCamera((at[0], at[1], 50), at, height=7)
+    scene = replace(lit(EnvironmentLight((1.0, 0.5, 2.0)), camera=camera), objects=(ball,))
+    stage = Stage(gpu, scene)
+    found = integral(stage, (24, 24), tolerance=0.02)
+    L_d = Renderer(scene, make_method("lambert"), (24, 24), gpu).frame(aovs=["irradiance"]).aovs["irradiance"]
+    seen = L_d[..., 0] > 0
+    assert found.M_back is not None and seen.sum() > 300 and (found.M[~seen] == 0).all()
+    L_d, opposed, across = L_d[seen], WIDE.beyond(np.sqrt(2) * a), WIDE.beyond(2 * a)
+    np.testing.assert_allclose(found.M[seen], WIDE.total * (1 - across) * L_d, rtol=0.01)
+    back = WIDE.total * (opposed - across) * L_d
+    np.testing.assert_allclose(found.M_back[seen].mean(axis=0), back.mean(axis=0), rtol=0.01)
+    front, behind = at_vertices(stage, stage.bodies[0], tolerance=0.02)
+    assert front.shape == behind.shape == ball.mesh.positions.shape
+    np.testing.assert_allclose(front + behind, np.broadcast_to(found.M[12, 12], front.shape), rtol=0.005)
+    np.testing.assert_allclose(behind.mean(axis=0), back.mean(axis=0), rtol=0.01)
+
+
+@pytest.mark.parametrize(("thickness", "vertices"), [(2.0, 6000), (0.5, 3000)])
+def test_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> None:
+    """The thin one is thinner than the radius within which samples give way to a plane: its far face must not."""
+    below = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=2)
+    up = DirectionalLight((0, 1, 0), (2.0, 2.0, 2.0))
+    scene = lit(up, mesh=shapes.slab((30, thickness, 30), vertices), material=SOFT, camera=below)
+    stage = Stage(gpu, scene)
+    places = Samples(*_under(scene.objects[0].mesh, thickness / 2))
+    spacing = 0.5
+    assert (RADIUS * spacing > thickness) == (thickness == 0.5)
+    found = at_spacing(stage.bodies[0], places, np.zeros((len(places.face), 3)), WIDE, spacing)
+    np.testing.assert_array_equal(found.front, 0)
+    expected = 2.0 * WIDE.total * WIDE.beyond(thickness)
+    np.testing.assert_allclose(found.back, np.broadcast_to(expected, found.back.shape), rtol=0.01)
+
+
+def _under(mesh: Mesh, height: float) -> tuple[Any, Any, Any]:
+    """Places on the faces of a slab's top within 2 mm of its middle."""
+    middle = mesh.positions[mesh.faces].mean(axis=1)
+    faces = np.flatnonzero((middle[:, 1] > 0.99 * height) & (np.abs(middle[:, [0, 2]]).max(axis=1) < 2)).astype(
+        np.int32
+    )
+    return faces, np.full((len(faces), 3), 1 / 3), np.zeros(len(faces))
+
+
+@pytest.mark.parametrize("profile", [SKIN_GAUSSIANS, BURLEY], ids=["skin", "burley"])
+def test_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
+    """By a base colour applied before diffusion, white beyond a straight edge: two spacings away from it M is the
+    integral of the line spread function. Skin's narrowest Gaussian is narrower than samples are apart, Burley's profile
+    has no limit at 0."""
+    color = np.zeros((1, 1000, 3), np.uint8)
+    color[:, 470:] = 255
+    side, spacing = 24.0, 0.15
+    edge = ((0.47 - 0.01) / 0.98 - 0.5) * side
+    striped = replace(MATTE, color_after=0.0, maps=replace(MATTE.maps, base_color=color))
+    stage = Stage(gpu, lit(SUN, mesh=plane(side), material=striped))
+    body = stage.bodies[0]
+    places = scattered(body.mesh, 4000)
+    x = body.at(places).position
+    keep = (np.abs(x[:, 2]) < 3) & (np.abs(x[:, 0] - edge) < 2) & (np.abs(x[:, 0] - edge) > 2 * spacing)
+    places = Samples(places.face[keep], places.barycentric[keep], places.share[keep])
+    x = x[keep, 0].astype(float) - edge
+    found = at_spacing(body, places, irradiance_at(body, places), profile, spacing)
+    t = np.geomspace(1e-9, 12, 4000)
+    spread = profile.line_spread(t)
+    half = np.concatenate([[[0, 0, 0]], np.cumsum(0.5 * (spread[1:] + spread[:-1]) * np.diff(t)[:, None], axis=0)])
+    within = np.stack([np.interp(np.abs(x), t, half[:, c]) for c in range(3)], axis=-1)
+    expected = 2.0 * (0.5 * profile.total + np.sign(x)[:, None] * within)
+    assert keep.sum() > 50 and found.samples < 150_000
+    np.testing.assert_allclose(found.front, expected, atol=0.01 * 2.0 * profile.total.max())
+    np.testing.assert_array_equal(found.back, 0)
+
+
+@pytest.mark.parametrize(
+    "profile", [WIDE, material("skin1").profile, replace(BURLEY)], ids=["wide", "dipole", "burley"]
+)
+def test_error_falls_faster_than_the_spacing(gpu: Gpu, profile: Profile) -> None:
+    mesh = shapes.sphere(5.0, vertices=250)
+    stage = Stage(gpu, lit(PointLight((0, 30, 5), (1e-3, 1e-3, 1e-3)), mesh=mesh, material=SOFT))
+    body, places = stage.bodies[0], scattered(mesh, 200)
+    L_d = irradiance_at(body, places)
+    *coarse, exact = (at_spacing(body, places, L_d, profile, spacing) for spacing in (1.0, 0.5, 0.25, 0.1))
+    wanted = exact.front + exact.back
+    errors = np.array([rms(found.front + found.back - wanted) / rms(wanted) for found in coarse])
+    assert (errors[-1] < 0.005).all()
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert (orders > 1.0).all() and orders.mean() > 1.4
+
+
+def test_base_colour_and_a_profile_of_another_kind(gpu: Gpu) -> None:
+    half = replace(SOFT, base_color=(0.5, 0.25, 1.0), color_after=0.3)
+    scene = lit(SUN, material=half, camera=replace(ABOVE, height=2))
+    stage = Stage(gpu, scene)
+    for profile in (None, BURLEY):
+        found = integral(stage, (4, 4), profiles={0: profile} if profile else None)
+        total = (profile or WIDE).total
+        np.testing.assert_allclose(found.M, np.broadcast_to(2.0 * total * half.base_color, found.M.shape), rtol=2e-3)
+    front, back = at_vertices(stage, stage.bodies[0], tolerance=0.04)
+    middle = np.abs(stage.bodies[0].mesh.positions).max(axis=1) < 1
+    expected = 2.0 * WIDE.total * np.array(half.base_color) ** 0.7
+    np.testing.assert_allclose(front[middle], np.broadcast_to(expected, front[middle].shape), rtol=2e-3)
+    assert (back == 0).all()
+
+
+def test_light_stays_in_the_object_it_entered(gpu: Gpu) -> None:
+    """A plane half a millimetre below a lit one, in its shadow."""
+    below = OrthographicCamera((0, -50, 0), (0, 0, 0), up=(0, 0, -1), height=4)
+    hidden = Object(plane(20, y=-0.5), SOFT)
+    found = integral(Stage(gpu, lit(SUN, material=SOFT, camera=below, extra=(hidden,))), (4, 4), samples=20_000)
+    np.testing.assert_array_equal(found.M, 0)
+
+
+def test_what_is_interrupted_goes_on(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
+    monkeypatch.setattr(surface_sum, "_PART", 1)  # a part for each workgroup
+    stage = Stage(gpu, lit(SUN, mesh=shapes.sphere(5.0, vertices=250), material=SOFT))
+    summed, most, done = surface_sum._Source.summed, 6, []
+
+    def interrupted(self: Any, receivers: Any, bar: Any) -> Any:
+        if len(done) == most:
+            raise KeyboardInterrupt
+        done.append(len(receivers.position))
+        return summed(self, receivers, bar)
+
+    monkeypatch.setattr(surface_sum._Source, "summed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        integral(stage, (48, 48), tolerance=0.05)
+    most = 10_000
+    first, found = done[:], integral(stage, (48, 48), tolerance=0.05)
+    resumed = done[len(first) :]
+    done.clear()
+    monkeypatch.setenv("WGSSS_CACHE", str(tmp_path / "other"))
+    whole = integral(stage, (48, 48), tolerance=0.05)
+    assert len(first) == 6 and sorted(first + resumed) == sorted(done)
+    np.testing.assert_array_equal(found.M, whole.M)
+    done.clear()
+    again = integral(stage, (48, 48), tolerance=0.05)  # the whole, from the cache
+    np.testing.assert_array_equal(again.M, whole.M)
+    assert not done
+    brighter = Stage(gpu, replace(stage.scene, lights=(replace(SUN, irradiance=(4.0, 4.0, 4.0)),)))
+    np.testing.assert_allclose(integral(brighter, (48, 48), tolerance=0.05).M, 2 * whole.M, rtol=1e-5)
+    assert done
+
+
+def test_says_when_it_must_stop_too_early(gpu: Gpu) -> None:
+    stage = Stage(gpu, lit(SUN, mesh=shapes.sphere(5.0, vertices=250), material=SOFT))
+    for _ in range(2):  # and again when the result comes from the cache
+        with pytest.warns(UserWarning, match=r"white on sphere: M still moves by .* from \d+ to \d+ samples"):
+            found = integral(stage, (16, 16), tolerance=1e-5, samples=20_000)
+    assert 0 < found.error.max() < 0.1 * found.M.max()
+    with pytest.warns(UserWarning, match="mm apart, too far for the material"):
+        integral(stage, (16, 16), profiles={0: SKIN_GAUSSIANS}, samples=1000)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        loose = integral(stage, (16, 16), tolerance=0.05)
+    assert rms(loose.error[loose.M[..., 0] > 0]).max() < 0.05 * rms(loose.M[loose.M[..., 0] > 0]).max()
+
+
+def test_goes_where_methods_go(gpu: Gpu) -> None:
+    assert REFERENCES["integral"] is Integral
+    method = make_method("integral", {"tolerance": "0.05", "samples": "20000"})
+    assert isinstance(method, Integral) and (method.tolerance, method.samples) == (0.05, 20_000)
+    side = DirectionalLight((0.5, 1, 0), (2.0, 2.0, 2.0))
+    scene = lit(side, mesh=shapes.sphere(2.0, vertices=250), material=SOFT)
+    image = Renderer(scene, method, (16, 16), gpu).frame(aovs=["M_front", "M_back"])
+    found = method.estimate(Stage(gpu, scene), (16, 16))
+    np.testing.assert_allclose(image.aovs["M_front"], found.M_front, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(image.aovs["M_back"], found.M_back, rtol=1e-3, atol=1e-4)
+    assert found.M_back is not None and found.M_back.max() > 0.01
