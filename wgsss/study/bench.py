@@ -160,7 +160,7 @@ def _cluster(address: str) -> Iterator[Place]:
         from distributed import Client, as_completed
     except ImportError:
         raise InputError("a scheduler needs Dask: install wgsss[cluster]") from None
-    from wgsss.study.run import adapter, measure
+    from wgsss.study.run import adapter, measure, version
 
     try:
         client = Client(address, timeout=10)
@@ -176,4 +176,7 @@ def _cluster(address: str) -> Iterator[Place]:
         adapters = set(client.run(adapter).values())
         if not adapters:
             raise InputError(f"the Dask cluster at '{address}' has no workers")
+        others = set(client.run(version).values()) - {version()}
+        if others:
+            raise InputError(f"workers at '{address}' run wgsss {', '.join(sorted(others))}, here is {version()}")
         yield adapters, runs

@@ -29,6 +29,7 @@ _SHAPES = ((40, 0, 0), (4, 0, 45), (3, 0, 0), (4, 0, 0), (3, 0, 180), (5, 1, 0),
 _PLACES = ("lambert", "deon07", "sam", "jensen02", "jimenez15", "jimenez08", "barre11", "francois06", "oat06")
 
 _INK, _FAINT, _FRONT, _FLOOR = "#333333", "#767676", "#555555", "#EBEBEB"
+_LOOK: dict[Any, Any] = {"font.size": 9.5, "svg.hashsalt": "wgsss", "text.color": _INK, "axes.edgecolor": _FAINT}
 _COLUMNS = 3
 _OFFSETS = (
     *((7, 6), (7, -14), (-7, 6), (-7, -14), (0, 11), (0, -19), (11, -4), (-11, -4)),
@@ -60,11 +61,13 @@ def draw(runs: Sequence[Run], folder: str | Path) -> list[Path]:
     Of runs that differ in nothing but date and version, the last one counts. Raises InputError where there is no run,
     or the folder cannot be written.
     """
+    import matplotlib
+
     from wgsss.study.chart_html import page
 
     found = panels(runs)
     paths = [Path(folder) / name for name in FILES]
-    with replacing(*paths) as (svg, png, html):
+    with replacing(*paths) as (svg, png, html), matplotlib.rc_context(_LOOK):
         figure = _figure(found)
         figure.savefig(svg, metadata={"Date": None})
         figure.savefig(png, dpi=150)
@@ -154,7 +157,6 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _figure(found: Sequence[Panel]) -> Any:
-    import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.lines import Line2D
@@ -162,29 +164,24 @@ def _figure(found: Sequence[Panel]) -> Any:
     columns = min(len(found), _COLUMNS)
     rows = -(-len(found) // columns)
     size = (max(5.0 * columns, 6.4), 4.4 * rows + 1.2)
-    with matplotlib.rc_context(
-        {"font.size": 9.5, "svg.hashsalt": "wgsss", "text.color": _INK, "axes.edgecolor": _FAINT}
-    ):
-        text = textwrap.fill(caption(found), round(15.5 * size[0]))
-        below = (0.22 + 0.15 * text.count("\n")) / size[1]
-        layout = ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below), w_pad=0.08, h_pad=0.08)
-        figure = Figure(figsize=size, layout=layout, facecolor="white")
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axis in axes[len(found) :]:
-            axis.set_axis_off()
-        placed = [(axis, _panel(axis, panel)) for axis, panel in zip(axes, found, strict=False)]
-        methods = sorted({method for panel in found for method in panel.methods}, key=lambda m: (_place(m), m))
-        keys = [_mark(style(method), True) for method in methods]
-        handles = [Line2D([], [], ls="--", lw=1.2, label=m, **key) for m, key in zip(methods, keys, strict=True)]
-        handles.append(Line2D([], [], color=_FRONT, lw=1.8, label="best for its time"))
-        figure.legend(
-            handles=handles, loc="outside upper left", ncols=min(len(handles), 2 + 3 * columns), frameon=False
-        )
-        figure.text(0.1 / size[0], 0.08 / size[1], text, fontsize=8, color=_FAINT)
-        figure.draw_without_rendering()  # settles the layout, which the labels need to know
-        figure.set_layout_engine("none")
-        for axis, wanted in placed:
-            _place_labels(axis, wanted)
+    text = textwrap.fill(caption(found), round(15.5 * size[0]))
+    below = (0.22 + 0.15 * text.count("\n")) / size[1]
+    layout = ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below), w_pad=0.08, h_pad=0.08)
+    figure = Figure(figsize=size, layout=layout, facecolor="white")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axis in axes[len(found) :]:
+        axis.set_axis_off()
+    placed = [(axis, _panel(axis, panel)) for axis, panel in zip(axes, found, strict=False)]
+    methods = sorted({method for panel in found for method in panel.methods}, key=lambda m: (_place(m), m))
+    keys = [_mark(style(method), True) for method in methods]
+    handles = [Line2D([], [], ls="--", lw=1.2, label=m, **key) for m, key in zip(methods, keys, strict=True)]
+    handles.append(Line2D([], [], color=_FRONT, lw=1.8, label="best for its time"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 2 + 3 * columns), frameon=False)
+    figure.text(0.1 / size[0], 0.08 / size[1], text, fontsize=8, color=_FAINT)
+    figure.draw_without_rendering()  # settles the layout, which the labels need to know
+    figure.set_layout_engine("none")
+    for axis, wanted in placed:
+        _place_labels(axis, wanted)
     return figure
 
 

@@ -1,0 +1,121 @@
+"""`wgsss bench`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wgsss.cli import main
+from wgsss.methods import METHODS
+from wgsss.reference import REFERENCES
+from wgsss.scene import Scene
+from wgsss.study import run as runs_of
+from wgsss.study.run import Spec
+
+FILES = ["chart.html", "chart.png", "chart.svg", "runs.jsonl"]
+
+
+def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[str, str]:
+    assert main(["bench", *argv]) == code
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return out, err
+
+
+@pytest.fixture
+def done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Spec]:
+    """Runs that cost nothing, in an empty folder."""
+    specs: list[Spec] = []
+
+    def fake(scene: Scene, spec: Spec) -> dict[str, Any]:
+        specs.append(spec)
+        ms = 10.0 * len(specs)
+        costs = {"bake_ms": 1.0, "bake_cached": False, "frame_ms": ms, "frame_ms_quartiles": [ms, ms], "frames": 9}
+        where = {"adapter": "a", "clock": "sundial", "date": "2026-01-02T03:04:05+00:00", "passes": {}, "bytes": 7}
+        error = {"rel_rmse": 1.0 / ms, "psnr": None, "flip": None, "bias": 1.0}
+        return {**spec.json(), **costs, **where, "error": error, "floor": 0.01}
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runs_of, "measure", fake)
+    monkeypatch.setattr(runs_of, "adapter", lambda: "a")
+    monkeypatch.setitem(REFERENCES, "integral", METHODS["lambert"])  # a name is all that is asked of it here
+    return specs
+
+
+def test_text_has_a_row_per_run_and_the_files(done: list[Spec], tmp_path: Path, capsys):
+    out, err = run(capsys, "slab", "sphere", "--methods", "lambert,deon07")
+    table, files = out.split("\n\n")
+    rows = [line.split()[:2] for line in table.splitlines()]
+    assert rows[1:] == [[scene, m] for scene in ("slab", "sphere") for m in ("lambert", *["deon07"] * 4)]
+    assert "map_size=2048" in table and "10.0" in table and "cold" in table
+    assert sorted(path.name for path in (tmp_path / "bench").iterdir()) == FILES
+    assert files.split() == [f"bench/chart.{ending}" for ending in ("svg", "png", "html")]
+    assert len(err.splitlines()) == len(done) == 10  # a line per run, as it ends
+
+
+def test_json_has_the_runs(done: list[Spec], capsys):
+    result = json.loads(run(capsys, "slab", "--methods", "lambert", "--size", "32x24", "-o", "here", "--json")[0])
+    assert result["files"] == ["here/chart.svg", "here/chart.png", "here/chart.html"]
+    (found,) = result["runs"]
+    promised = {"scene", "method", "knobs", "size", "adapter", "bake_ms", "frame_ms", "passes", "bytes", "error"}
+    assert promised <= found.keys() and found["error"].keys() == {"rel_rmse", "psnr", "flip", "bias"}
+    assert (found["scene"], found["size"], found["reference"]) == ("slab", [32, 24], "integral")
+
+
+def test_the_chart_has_all_runs_of_the_folder_and_without_a_scene_it_is_all_there_is(done: list[Spec], capsys):
+    run(capsys, "slab", "--methods", "lambert")
+    first = Path("bench/chart.svg").read_text()
+    run(capsys, "sphere", "--methods", "lambert")
+    both = Path("bench/chart.svg").read_text()
+    assert first != both
+    Path("bench/chart.svg").unlink()
+    out, err = run(capsys)
+    assert Path("bench/chart.svg").read_text() == both and err == "" and len(done) == 2
+    assert [line.split()[0] for line in out.splitlines()[1:3]] == ["slab", "sphere"]
+
+
+def test_a_scene_named_twice_is_measured_once(done: list[Spec], capsys):
+    run(capsys, "slab", "slab", "--methods", "lambert,lambert")
+    assert len(done) == 1
+
+
+def test_ctrl_c_keeps_what_is_done(done: list[Spec], monkeypatch: pytest.MonkeyPatch, capsys):
+    fake = runs_of.measure
+
+    def interrupted(scene: Scene, spec: Spec) -> Any:
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        return fake(scene, spec)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runs_of, "measure", interrupted)
+        run(capsys, "slab", "--methods", "deon07", code=130)
+    assert len(Path("bench/runs.jsonl").read_text().splitlines()) == 2
+    run(capsys, "slab", "--methods", "deon07")
+    assert [spec.knobs["map_size"] for spec in done] == [256, 512, 1024, 2048]
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        ([], r"bench/runs.jsonl: cannot be read \(No such file"),
+        (["eer"], "unknown scene 'eer'; did you mean 'ear'"),
+        (["slab", "--methods", "lambrt"], "unknown method 'lambrt'; did you mean 'lambert'"),
+        (["slab", "--methods", "lambert,"], "'lambert,' is not a list of names"),
+        (["slab", "--reference", "truth"], "unknown reference 'truth'"),
+        (["slab", "--size", "64"], "'64' is not WIDTHxHEIGHT"),
+        (["slab", "-o", "file"], "file/runs.jsonl: cannot be written"),
+        (["slab", "--scheduler", "tcp://127.0.0.1:1"], r"Dask"),
+        (["no/scene.toml"], "no/scene.toml"),
+    ],
+)
+def test_bad_input_is_one_line(argv, says, done: list[Spec], monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    Path("file").touch()
+    out, err = run(capsys, *argv, code=2)
+    assert out == "" and err.count("\n") == 1 and re.search(says, err), err
+    assert not done
