@@ -6,6 +6,7 @@ import importlib.util
 import math
 import subprocess
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -283,8 +284,8 @@ def towards_plus_x(path):
 LIGHTS = {
     "directional": DirectionalLight((-1, -2, -3), (1, 2, 4)),
     "point": PointLight((30, 20, 25), (0.001, 0.002, 0.004)),
-    "rect": RectLight((20, 10, 30), (-2, -1, -3), (0, 1, 1), 10, 24, (1, 2, 4), samples=256),
-    "sphere": SphereLight((20, 10, 25), 6, (1, 2, 4), samples=256),
+    "rect": RectLight((20, 10, 30), (-2, -1, -3), (0, 1, 1), 10, 24, (1, 2, 4), samples=64),
+    "sphere": SphereLight((20, 10, 25), 6, (1, 2, 4), samples=64),
     "environment": SKY,
     "image": EnvironmentLight((1, 2, 4), file="", rotation=40),
 }
@@ -349,7 +350,8 @@ def test_ball_that_absorbs_nothing(gpu, monkeypatch, by):
     half, size = 4.5, (6, 6)
     scene = ball(SKY, camera=OrthographicCamera((0, 0, 90), (0, 0, 0), height=2 * half))
     stage, volume = Stage(gpu, scene), Volume(samples=400)
-    estimate = volume.estimate(stage, size)
+    with pytest.warns(UserWarning, match="no LLVM") if by == "scalar" else nullcontext():
+        estimate = volume.estimate(stage, size)
     x = half * (2 * (np.arange(6) + 0.5) / 6 - 1)
     inside = 2 * np.sqrt(100 - x**2 - x[:, None] ** 2)
     exact = math.pi * (1 - np.exp(-0.5 * inside))[..., None] * (1.0, 2.0, 4.0)
@@ -373,11 +375,11 @@ def test_smooth_ball_that_absorbs_nothing(gpu):
     times the base colour."""
     white = replace(MATCHED, eta=1.4, roughness=0.02, sigma_s_prime=(2.0, 2.0, 2.0), base_color=(1.0, 0.5, 0.25))
     scene = ball(SKY, medium=white, camera=OrthographicCamera((0, 0, 90), (0, 0, 0), height=19.0))
-    estimate = Volume(samples=256).estimate(Stage(gpu, scene), (5, 5))
+    estimate = Volume(samples=128).estimate(Stage(gpu, scene), (5, 5))
     seen = estimate.M[..., 0] > 0
     assert seen.sum() == 21
-    assert estimate.M[seen] == pytest.approx(math.pi, abs=0.35)
-    assert estimate.M[seen].mean() == pytest.approx(math.pi, rel=0.01)
+    assert estimate.M[seen] == pytest.approx(math.pi, abs=0.45)
+    assert estimate.M[seen].mean() == pytest.approx(math.pi, rel=0.015)
 
 
 @needs_mitsuba
@@ -393,7 +395,7 @@ def test_slab_of_photons(gpu):
     mu, weights = 0.5 * (mu + 1), 0.5 * weights
     along = [(math.sqrt(1 - c * c), 0, -side * c) for side in (1, -1) for c in mu]
     rays = np.hstack([np.array([(0, 0, np.sign(-d[2]) * thickness / 2) for d in along]) - along, along])
-    samples = 6000 if newest_llvm() else 1000
+    samples = 3000 if newest_llvm() else 1000
     leaving, variance = np.zeros((2, 10, 3))
     with Paths(scene, (8, 8), rays) as paths, tqdm(disable=True) as bar:
         for channel in range(3):
@@ -406,7 +408,7 @@ def test_slab_of_photons(gpu):
     straight = np.exp(-thickness * (np.array(skin.sigma_a) + skin.sigma_s_prime))
     wanted = np.stack([photons.total, photons.total_transmittance - straight])
     error = np.hypot(error, [photons.total_error, photons.total_transmittance_error])
-    assert (error < 0.03 * wanted).all()
+    assert (error < 0.06 * wanted).all()
     assert np.abs(found - wanted).max() < 4 * error.max()
     assert (np.abs(found - wanted) < 3.5 * error).all()
 
@@ -431,6 +433,6 @@ def test_mitsuba_that_fails_says_why(gpu, monkeypatch):
     scene = ball(SKY)
     with Paths(scene, (8, 8), np.zeros((1, 6))) as paths, tqdm(disable=True) as bar:
         paths._variant = "nonsense"
-        with pytest.raises(RenderError, match=r"Mitsuba: it ended: .*nonsense") as caught:
+        with pytest.raises(RenderError, match=r"Mitsuba: it ended: .*nonsense") as caught, pytest.warns(UserWarning):
             paths.follow(0, True, 2, bar)
     assert "\n" not in str(caught.value)

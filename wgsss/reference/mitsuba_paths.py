@@ -8,9 +8,11 @@ import importlib.util
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +59,6 @@ class Paths:
         return self
 
     def __exit__(self, *_: object) -> None:
-        import shutil
-
         if self._process:
             self._process.kill()
             self._process.wait()
@@ -121,6 +121,12 @@ class Paths:
 
     def _start(self, rays: Path) -> subprocess.Popen[str]:
         np.save(rays, self._rays)
+        if self._llvm is None:
+            warnings.warn(
+                f"no LLVM of at least version {_LEAST_LLVM} found (libllvm19 in Debian): Mitsuba follows one path after"
+                " another, on one core",
+                stacklevel=2,
+            )
         environment = {**os.environ, **({"DRJIT_LIBLLVM_PATH": self._llvm} if self._llvm else {})}
         # -P: the folder of the program holds modules of ours, which are not those of its imports.
         command = [sys.executable, "-P", str(mitsuba_render.__file__), self._variant]

@@ -42,7 +42,7 @@ class Scenes:
         for first in range(0, len(rays), step):
             some = rays[first : first + step]
             if self._vectorised:
-                found = self._together(scene, sampler, some, paths, seed + first)
+                found = self._together(scene, sampler, some, paths, seed + first // step)
             else:
                 found = self._singly(scene, sampler, some[0], paths)
             moments[first : first + step, 0] = found.mean(axis=1)

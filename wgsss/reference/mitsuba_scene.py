@@ -98,6 +98,8 @@ def check(scene: Scene) -> list[str]:
             notes["normal maps are left out"] = None
         if material.eta > 1 and material.roughness > SMOOTH:
             notes["a rough boundary loses what its facets reflect twice"] = None
+            if sizeless:
+                notes["through it, paths find directional and point lights by chance: it takes thousands"] = None
         if material.eta > 1 and (material.specular < 1 or material.maps.specular is not None):
             notes["boundaries reflect in full, whatever specular says"] = None
     if len([light for light in scene.lights if isinstance(light, EnvironmentLight) and light.file]) > 1:

@@ -31,6 +31,10 @@ class Volume(Reference):
     of the lights themselves, and is left out.
 
     Paths begin in the middle of a pixel, where our frame looks too; each channel is followed on its own.
+
+    Under a uniform sky, hundreds of paths per pixel do where no boundary reflects. Through a rough boundary, small
+    lights take thousands and more; and that boundary loses light, as Mitsuba's does not follow what one facet sends to
+    another: of a white medium 10 % at an eta of 1.5 and a roughness of 0.35, 35 % at 0.6, nothing at 0.02.
     """
 
     samples: int = field(
