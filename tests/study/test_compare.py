@@ -104,7 +104,7 @@ def test_footprint_counts_what_persists_once(gpu):
 
 
 def test_mean_irradiance_in_closed_form():
-    """Of a plane that faces the light; of a ball under parallel light, a quarter; under a sky, pi times its radiance."""
+    """Of a plane that faces the light; of a ball in parallel light, a quarter; under a sky, pi times its radiance."""
     floor = lit(mesh=plane(2.0))
     assert mean_irradiance(floor, (DirectionalLight((0, -1, 0), (1, 2, 3)),)) == pytest.approx(2.0)
     assert mean_irradiance(floor, (DirectionalLight((0, -1, 1), (2, 2, 2)),)) == pytest.approx(math.sqrt(2.0))

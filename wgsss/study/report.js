@@ -55,18 +55,19 @@ function fill() {
     mark.style.left = 100 * at + "%";
     return mark;
   }));
-  const cards = new Map();
+  const cards = [], pictures = light.images.length / 2;
   light.images.forEach((image, i) => {
     const view = make("div", { className: "view" }, make("img", { src: image.source, alt: image.title, draggable: false }));
     movable(view);
-    if (!cards.has(image.name)) {
-      const caption = make("figcaption", {}, make("span", { textContent: image.name }));
+    const shown = i % pictures; // the pictures come first, then their errors
+    if (i === shown) {
+      const caption = make("figcaption", {}, make("span", { textContent: image.title }));
       caption.append(make("small", { textContent: image.note }), button(i, "a", "left"), button(i, "b", "right"));
-      cards.set(image.name, make("figure", {}, caption));
+      cards.push(make("figure", {}, caption));
     }
-    cards.get(image.name).append(view);
+    cards[shown].append(view);
   });
-  byId("sheet").replaceChildren(...cards.values());
+  byId("sheet").replaceChildren(...cards);
   choose();
   show();
 }

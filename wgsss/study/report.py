@@ -30,8 +30,9 @@ _PACKAGES = ("wgpu", "numpy", "flip-evaluator", "mitsuba")
 
 
 def write_report(comparison: Comparison, folder: Path) -> list[Path]:
-    """Write `report.html`, `contact_sheet.png`, `metrics.json` and, for the reference and each method, its picture
-    (.png), its error map (.error.png) and its linear M with what else was asked for (.exr); give back the files.
+    """Write `report.html`, `contact_sheet.png`, `metrics.json` and, for `reference` and each method, its picture
+    (.png), its linear M with irradiance and depth (.exr) and, for methods, its error map (.error.png); give back the
+    files.
 
     All appear at once, when all are written; files of other names that are in the folder stay.
     Raises InputError where the folder cannot be written.
@@ -103,14 +104,15 @@ def _data(comparison: Comparison) -> dict[str, Any]:
 
 def _light(name: str, comparison: Comparison) -> dict[str, Any]:
     truth, end = comparison.reference, error_maps.top(comparison)
-    images = [{"name": truth, "title": truth, "note": "reference", "source": _uri(comparison.image.display)}]
+    shown = [(truth, "reference", comparison.image.display, error_maps.own(comparison))]
+    found = error_maps.maps(comparison)
     for run in comparison.runs:
-        note = tables.percent(run.errors.rel_rmse)
-        images.append({"name": run.name, "title": run.name, "note": note, "source": _uri(run.image.display)})
-    own = error_maps.own(comparison)
-    for key, values in {truth: own, **error_maps.maps(comparison)}.items():
-        source = _uri(error_maps.coloured(values, comparison.seen, end))
-        images.append({"name": key, "title": f"{key}: {'its own ' if key == truth else ''}error", "source": source})
+        shown.append((run.name, tables.percent(run.errors.rel_rmse), run.image.display, found[run.name]))
+    images = [{"title": title, "note": note, "source": _uri(display)} for title, note, display, _ in shown]
+    for i, (title, note, _, error) in enumerate(shown):
+        title += ": error" if i else ": its own error"
+        source = _uri(error_maps.coloured(error, comparison.seen, end))
+        images.append({"title": title, "note": note, "source": source})
     return {
         "name": name,
         "images": images,
@@ -130,7 +132,7 @@ def _causes(comparison: Comparison) -> dict[str, Any]:
 
 
 def _named_images(comparison: Comparison) -> Iterator[tuple[str, Image]]:
-    yield comparison.reference, comparison.image
+    yield "reference", comparison.image
     for run in comparison.runs:
         yield _file(run.name), run.image
 

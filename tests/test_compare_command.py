@@ -1,0 +1,80 @@
+"""`wgsss compare`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from standins import Scaled
+
+from wgsss.cli import main
+from wgsss.reference import REFERENCES
+from wgsss.study import compare
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setitem(REFERENCES, "integral", Scaled)
+    monkeypatch.setattr(compare, "WARM_FRAMES", 1)
+
+
+def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[str, str]:
+    assert main(["compare", *argv]) == code
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return out, err
+
+
+SMALL = ("sphere", "--vertices", "600", "--size", "32x32", "--methods", "lambert")
+
+
+def test_text_and_files(tmp_path: Path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out, err = run(capsys, *SMALL)
+    lines = out.splitlines()
+    assert lines[0].split()[:3] == ["method", "rel", "RMSE"] and lines[1].split()[:3] == ["lambert", "20", "%"]
+    assert "error of integral itself: 1.6 %" in lines and lines[-1] == "sphere-compare/report.html"
+    assert "by type of light" not in out and "by cause" not in out and err == ""
+    assert (tmp_path / "sphere-compare" / "report.html").stat().st_size > 20_000
+    numbers = json.loads((tmp_path / "sphere-compare" / "metrics.json").read_text())
+    assert numbers["methods"][0]["error"]["rel_rmse"] == pytest.approx(0.2, rel=1e-4)
+
+
+def test_json(tmp_path: Path, capsys):
+    out, _ = run(capsys, *SMALL, "-o", str(tmp_path / "here"), "--json")
+    found = json.loads(out)
+    assert found.keys() == {"scene", "reference", "adapter", "size", "methods", "files"}
+    assert found["scene"] == "sphere" and found["size"] == [32, 32]
+    assert all(Path(file).is_file() and Path(file).parent == tmp_path / "here" for file in found["files"])
+
+
+def test_lights_of_all_types(tmp_path: Path, capsys):
+    argv = [*SMALL, "--lights", "all", "-o", str(tmp_path / "here")]
+    rows = run(capsys, *argv)[0].split("by type of light: rel RMSE\n")[1].splitlines()
+    assert rows[0].split() == ["method", "directional", "point", "area", "environment"]
+    assert rows[1].split() == ["lambert", *["20", "%"] * 4]
+    numbers = json.loads((tmp_path / "here" / "metrics.json").read_text())
+    assert list(numbers["lights"]) == ["directional", "point", "area", "environment"]
+    assert numbers["lights"]["area"][0]["method"] == "lambert"
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        (["spher"], "unknown scene 'spher'"),
+        (["sphere", "--methods", "lambert,deon7"], "unknown method 'deon7'; did you mean 'deon07'"),
+        (["sphere", "--methods", "lambert,,deon07"], "'lambert,,deon07' is not a list of names"),
+        (["sphere", "--reference", "lambert"], "unknown reference 'lambert'"),
+        (["sphere", "--size", "0x9", "--methods", "lambert"], "must be 1 to"),
+        (["sphere", "--lights", "some"], "invalid choice: 'some'"),
+        (["sphere", "-o", "/no/folder"], "/no/folder: there is no folder '/no'"),
+        (["sphere", "-o", "/dev/null"], "/dev/null: this is not a folder"),
+        (["sphere", "--light", "all"], "unknown option '--light'; did you mean '--lights'"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(argv, says, tmp_path: Path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out, err = run(capsys, *argv, code=2)
+    assert out == "" and err.count("\n") == 1 and says in err, err
+    assert not list(tmp_path.iterdir())
