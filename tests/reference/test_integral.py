@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from wgsss.bake.samples import Samples
 from wgsss.gpu import Gpu
 from wgsss.methods import make_method
 from wgsss.optics import SKIN_GAUSSIANS, NormalizedDiffusion, Profile, SumOfGaussians
-from wgsss.reference import REFERENCES, surface_sum
+from wgsss.reference import REFERENCES, convergence, surface_sum
+from wgsss.reference import integral as reference
 from wgsss.reference.convergence import RADIUS, at_spacing, irradiance_at
 from wgsss.reference.integral import Integral, at_vertices, integral
 from wgsss.reference.kernel import make_kernel
@@ -24,13 +26,16 @@ from wgsss.rendering import Renderer
 from wgsss.scene import (
     DirectionalLight,
     EnvironmentLight,
+    Maps,
     Mesh,
     Object,
     OrthographicCamera,
     PointLight,
+    Scene,
     material,
     shapes,
 )
+from wgsss.scene.motion import BendAndSwell
 from wgsss.stage import Stage
 
 WIDE = SumOfGaussians(np.array([1.0, 4.0]), np.array([[0.3, 0.2, 0.1], [0.4, 0.3, 0.2]]))
@@ -78,16 +83,17 @@ def test_a_kernel_holds_all_light(profile: Profile, radius: float) -> None:
 
 
 def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
-    """70,000 samples, more than lavapipe's loops turn, in a box wider than the profile's range."""
+    """70,000 samples, more than lavapipe's loops turn, in a box wider than the profile's range. On a lattice and along
+    its axes, many lie in a receiver's plane and at right angles to it: neither is behind it."""
     rng = np.random.default_rng(1)
-    count, receivers = 70_000, 100
-    box = np.array([30.0, 3.0, 3.0])
-    samples = surface_sum.Points(
-        *(a.astype(np.float32) for a in (box * rng.random((count, 3)), rng.normal(size=(count, 3))))
-    )
-    places = surface_sum.Points(
-        *(a.astype(np.float32) for a in (box * rng.random((receivers, 3)), rng.normal(size=(receivers, 3))))
-    )
+    count, receivers = 70_000, 70
+    box, axes = np.array([300, 30, 30]), np.concatenate([np.eye(3), -np.eye(3)])
+
+    def points(count: int) -> surface_sum.Points:
+        position = 0.1 * np.floor(box * rng.random((count, 3)))
+        return surface_sum.Points(position.astype(np.float32), axes[rng.integers(0, 6, count)].astype(np.float32))
+
+    samples, places = points(count), points(receivers)
     flux = rng.random((count, 3)).astype(np.float32)
     radius = 0.2
     kernel = make_kernel(WIDE, radius, 1e3)
@@ -260,11 +266,63 @@ def test_says_when_it_must_stop_too_early(gpu: Gpu) -> None:
             found = integral(stage, (16, 16), tolerance=1e-5, samples=20_000)
     assert 0 < found.error.max() < 0.1 * found.M.max()
     with pytest.warns(UserWarning, match="mm apart, too far for the material"):
-        integral(stage, (16, 16), profiles={0: SKIN_GAUSSIANS}, samples=1000)
+        integral(stage, (16, 16), profiles={0: NormalizedDiffusion((0.8,) * 3, (0.05,) * 3)}, samples=1000)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         loose = integral(stage, (16, 16), tolerance=0.05)
     assert rms(loose.error[loose.M[..., 0] > 0]).max() < 0.05 * rms(loose.M[loose.M[..., 0] > 0]).max()
+
+
+def test_anything_that_matters_is_another_entry(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
+    calls = []
+
+    def stub(body: Any, receivers: Samples, *settings: Any) -> SimpleNamespace:
+        calls.append(settings)
+        nothing = np.zeros((len(receivers.face), 3))
+        return SimpleNamespace(front=nothing, back=nothing, error=nothing, note="")
+
+    monkeypatch.setattr(reference, "converged", stub)
+    finger = Object(shapes.capsule(vertices=500), SOFT, motion=BendAndSwell())
+    scene = replace(lit(SUN, EnvironmentLight()), objects=(finger,), camera=replace(ABOVE, height=200))
+
+    def thing(**changes: Any) -> Scene:
+        return replace(scene, objects=(replace(finger, **changes),))
+
+    scenes = [
+        scene,
+        replace(scene, lights=(SUN, EnvironmentLight((1.0, 1.0, 1.1)))),
+        replace(scene, camera=replace(scene.camera, height=201)),
+        *(thing(material=replace(SOFT, **change)) for change in ({"color_after": 0.9}, {"roughness": 0.6})),
+        thing(material=replace(SOFT, maps=Maps(base_color=np.zeros((1, 1, 3), np.uint8)))),
+        thing(material=replace(SOFT, gaussians=SumOfGaussians(WIDE.variances, 0.99 * WIDE.weights))),
+        thing(translate=(0, 1, 0)),
+        thing(motion=None, mesh=shapes.capsule(vertices=600)),
+    ]
+    for stage in (*(Stage(gpu, scene) for scene in scenes), Stage(gpu, scene, 0.3)):
+        before = len(calls)
+        integral(stage, (16, 16))
+        integral(stage, (16, 16))
+        assert len(calls) == before + 1
+    before = len(calls)
+    integral(stage, (16, 17))
+    integral(stage, (16, 16), tolerance=0.02)
+    integral(stage, (16, 16), samples=1000)
+    integral(stage, (16, 16), profiles={0: BURLEY})
+    at_vertices(stage, stage.bodies[0])
+    at_vertices(stage, stage.bodies[0], profile=BURLEY)
+    assert len(calls) == before + 6
+
+
+def test_irradiance_of_many_places_comes_in_turns(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = shapes.sphere(5.0, vertices=250)
+    stage = Stage(gpu, lit(SUN, mesh=mesh, material=SOFT))
+    body, places = stage.bodies[0], scattered(mesh, 250)
+    at_once = irradiance_at(body, places)
+    monkeypatch.setattr(convergence, "_POINTS", 100)
+    np.testing.assert_array_equal(irradiance_at(body, places), at_once)
+    expected = 2.0 * np.maximum(body.at(places).normal[:, 1], 0)
+    np.testing.assert_allclose(at_once[:, 0], expected, atol=0.05)
 
 
 def test_goes_where_methods_go(gpu: Gpu) -> None:

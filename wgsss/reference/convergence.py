@@ -22,7 +22,7 @@ Array = npt.NDArray[Any]
 
 RADIUS = 3.0
 """Spacings within which L_d is taken as the same all over: with fewer, samples miss narrow profiles."""
-_RESOLVED = 0.25  # share of the light that leaves outside of that radius from the start, in the widest channel
+_RESOLVED = 0.1  # share of the light that leaves outside of that radius from the start, in the widest channel
 _POINTS = 1 << 18  # whose L_d one pass gathers
 
 
