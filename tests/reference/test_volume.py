@@ -120,6 +120,18 @@ def test_no_path_ends_by_chance_while_it_carries_light():
     assert value(xml(ball(SKY)).find("integrator"), "rr_depth") == [4096]
 
 
+@pytest.mark.parametrize(("channel", "integrator", "bsdf"), [(None, "volpathmis", "diffuse"), (1, "volpath", "null")])
+def test_lamps_let_light_through_where_the_integrator_can(channel, integrator, bsdf):
+    """Found with Mitsuba 3.9: behind a lamp without a boundary, volpathmis counts the sky twice."""
+    root = xml(ball(SKY, LIGHTS["sphere"]), channel=channel)
+    assert root.find("integrator").attrib["type"] == integrator
+    lamp = root.find("shape[@type='sphere']")
+    assert lamp.find("bsdf").attrib["type"] == bsdf
+    assert value(lamp, "radiance") == ([1, 2, 4] if channel is None else [2, 2, 2])
+    if bsdf == "diffuse":
+        assert value(lamp, "reflectance") == [0, 0, 0]
+
+
 # What is refused, and what is told.
 
 OPEN = Mesh(BALL.positions, BALL.faces[1:])
@@ -164,7 +176,8 @@ def test_what_is_not_shared_is_told_in_one_line(tmp_path):
         assert word in message
     assert "through the air" not in message  # a ball is convex
     assert "through the air" in told(SCENES["gyroid"](None), tmp_path)
-    assert told(ball(SKY), tmp_path) == ""
+    assert told(ball(SKY), tmp_path) == told(ball(LIGHTS["rect"]), tmp_path) == ""
+    assert "lamps hide" in told(ball(SKY, LIGHTS["rect"]), tmp_path)
 
 
 def test_folder_that_cannot_be_made(tmp_path):

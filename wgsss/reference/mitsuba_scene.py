@@ -9,7 +9,8 @@ A medium scatters with its reduced coefficients and alike in all directions. Its
 - a GGX dielectric of alpha = roughness^2, the surface that our specular lobe and rho_dt are the reflection of;
 - a smooth dielectric at the least roughness there is, where that lobe is narrower than a pixel.
 
-Lights of a finite size are drawn by nothing and let other light through, as they do here.
+Lights of a finite size are not seen. As here, they let other light through where `volpath` renders one channel;
+`volpathmis`, which renders all three, would count twice what a path meets behind them, so that there they are black.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
     notes = check(scene)
     if any(thing.material.base_color != (1.0, 1.0, 1.0) for thing in scene.objects):
         notes.append("base colours are left out")
+    if len(scene.lights) > 1 and any(isinstance(light, RectLight | SphereLight) for light in scene.lights):
+        notes.append("lamps hide what is behind them")
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -237,7 +240,10 @@ def _add_light(root: Element, light: Any, channel: int | None) -> None:
             assert isinstance(light, SphereLight)
             ElementTree.SubElement(place, "scale", value=_number(light.radius))
             ElementTree.SubElement(place, "translate", value=_numbers(light.position))
-        _plugin(shape, "bsdf", "null")
+        if channel is None:
+            _rgb(_plugin(shape, "bsdf", "diffuse"), "reflectance", (0.0, 0.0, 0.0), None)
+        else:
+            _plugin(shape, "bsdf", "null")
         _rgb(_plugin(shape, "emitter", "area"), "radiance", light.radiance, channel)
 
 
