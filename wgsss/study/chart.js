@@ -5,7 +5,7 @@ const percent = v => `${+(100 * v).toPrecision(3)} %`, plain = v => `${+v.toPrec
 const METRICS = {
   rel_rmse: { name: "relative RMSE of M", of: e => e.rel_rmse > 0 ? e.rel_rmse : null, log: true, form: percent },
   flip: { name: "FLIP of the picture", of: e => e.flip > 0 ? e.flip : null, log: true, form: plain },
-  bias: { name: "bias of M, either way", of: e => e.bias !== null && e.bias !== 1 ? Math.abs(e.bias - 1) : null, log: true, form: percent },
+  bias: { name: "bias of M, either way", of: e => e.bias === null ? null : Math.abs(e.bias - 1) || null, log: true, form: percent },
   psnr: { name: "PSNR, dB", of: e => e.psnr, log: false, up: true, form: plain },
 };
 const hidden = new Set();
@@ -82,16 +82,15 @@ function drawPanel(panel) {
   const picture = svg(section, "svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "group", "aria-label": panel.title });
   const shown = panel.runs.filter(run => metric.of(run.error) !== null);
   const runs = shown.filter(run => !hidden.has(run.method));
-  if (!runs.length) return void svg(picture, "text", { x: WIDTH / 2, y: HEIGHT / 2, "text-anchor": "middle" }, "nothing to show");
+  const middle = { "text-anchor": "middle" };
+  if (!runs.length) return void svg(picture, "text", { x: WIDTH / 2, y: HEIGHT / 2, ...middle }, "nothing to show");
   const floor = metric === METRICS.rel_rmse ? panel.floor : 0;
   const x = scale(shown.flatMap(run => [run.frame_ms, ...run.frame_ms_quartiles]), LEFT, WIDTH - RIGHT, true);
   const errors = shown.map(run => metric.of(run.error)).concat(floor > 0 ? [floor] : []);
   const y = scale(errors, HEIGHT - BOTTOM, TOP, metric.log);
   const bottom = HEIGHT - BOTTOM;
-  if (floor > 0) {
-    svg(picture, "rect", { class: "floor", x: LEFT, y: y(floor), width: WIDTH - RIGHT - LEFT, height: bottom - y(floor) });
-    svg(picture, "text", { x: LEFT + 6, y: y(floor) + 15 }, "the reference's own error");
-  }
+  const band = { class: "floor", x: LEFT, y: y(floor), width: WIDTH - RIGHT - LEFT, height: bottom - y(floor) };
+  if (floor > 0) svg(picture, "rect", band);
   for (const v of x.ticks) {
     svg(picture, "line", { class: "grid", x1: x(v), x2: x(v), y1: TOP, y2: bottom });
     svg(picture, "text", { x: x(v), y: bottom + 17, "text-anchor": "middle" }, plain(v));
@@ -100,15 +99,18 @@ function drawPanel(panel) {
     svg(picture, "line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: y(v), y2: y(v) });
     svg(picture, "text", { x: LEFT - 7, y: y(v) + 4, "text-anchor": "end" }, metric.form(v));
   }
+  if (floor > 0) svg(picture, "text", { x: LEFT + 6, y: band.y + 15 }, "the reference's own error");
   svg(picture, "text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, "frame time, ms");
-  svg(picture, "text", { transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, metric.name);
+  svg(picture, "text", { transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)`, ...middle }, metric.name);
 
   const points = runs.map(run => ({ run, x: run.frame_ms, y: (metric.up ? -1 : 1) * metric.of(run.error) }));
   const best = front(points), at = point => [x(point.x), y(Math.abs(point.y))];
   const steps = best.map(p => `H${x(p.x)}V${y(metric.of(p.run.error))}`);
-  svg(picture, "path", { class: "front", d: `M${x(best[0].x)} ${metric.up ? bottom : TOP}${steps.join("")}H${WIDTH - RIGHT}` });
+  const start = `M${x(best[0].x)} ${metric.up ? bottom : TOP}`;
+  svg(picture, "path", { class: "front", d: `${start}${steps.join("")}H${WIDTH - RIGHT}` });
   for (const method of new Set(runs.map(run => run.method))) {
-    const own = runs.filter(run => run.method === method), places = own.map(run => [x(run.frame_ms), y(metric.of(run.error))]);
+    const own = runs.filter(run => run.method === method);
+    const places = own.map(run => [x(run.frame_ms), y(metric.of(run.error))]);
     svg(picture, "polyline", { class: "sweep", points: places.join(" "), stroke: colour(method) });
   }
   const taken = points.map(point => around(...at(point)));
@@ -117,7 +119,8 @@ function drawPanel(panel) {
     const [low, high] = run.frame_ms_quartiles;
     svg(picture, "line", { class: "spread", x1: x(low), x2: x(high), y1: cy, y2: cy, stroke: paint });
     const look = kept ? { fill: paint, stroke: "var(--card)" } : { fill: "var(--card)", stroke: paint };
-    const says = `${run.method} ${knobs(run)}: ${plain(run.frame_ms)} ms, ${metric.name} ${metric.form(metric.of(run.error))}`;
+    const error = `${metric.name} ${metric.form(metric.of(run.error))}`;
+    const says = `${run.method} ${knobs(run)}: ${plain(run.frame_ms)} ms, ${error}`;
     const mark = svg(picture, "polygon", {
       class: kept ? "run best" : "run", points: shape(run.method, cx, cy, kept ? 7.5 : 5.5), tabindex: 0, role: "img",
       "aria-label": says, "data-method": run.method, ...look,
@@ -134,10 +137,12 @@ const around = (cx, cy) => ({ left: cx - 6, right: cx + 6, top: cy - 6, bottom: 
 function label(picture, text, cx, cy, taken) {
   if (!text) return;
   const made = svg(picture, "text", { class: "label" }, text);
-  const places = [[9, -7, "start"], [9, 16, "start"], [-9, -7, "end"], [-9, 16, "end"], [0, -13, "middle"], [0, 22, "middle"],
-    [14, 4, "start"], [-14, 4, "end"], [18, -20, "start"], [-18, 28, "end"], [-18, -20, "end"], [18, 28, "start"]];
+  const places = [
+    [9, -7, "start"], [9, 16, "start"], [-9, -7, "end"], [-9, 16, "end"], [0, -13, "middle"], [0, 22, "middle"],
+    [14, 4, "start"], [-14, 4, "end"], [18, -20, "start"], [-18, 28, "end"], [-18, -20, "end"], [18, 28, "start"],
+  ];
   for (const [dx, dy, anchor] of places) {
-    for (const [name, value] of Object.entries({ x: cx + dx, y: cy + dy, "text-anchor": anchor })) made.setAttribute(name, value);
+    for (const [name, value] of [["x", cx + dx], ["y", cy + dy], ["text-anchor", anchor]]) made.setAttribute(name, value);
     const { x, y, width, height } = made.getBBox(), box = { left: x, right: x + width, top: y, bottom: y + height };
     const inside = x >= LEFT && box.right <= WIDTH - RIGHT && y >= TOP && box.bottom <= HEIGHT - BOTTOM;
     const free = !taken.some(t => box.left < t.right && t.left < box.right && box.top < t.bottom && t.top < box.bottom);
@@ -158,7 +163,8 @@ function tell(run, mark) {
   const [low, high] = run.frame_ms_quartiles, { rel_rmse, psnr, flip, bias } = run.error;
   const or = (value, form) => value === null ? "–" : form(value);
   row("frame", `${plain(run.frame_ms)} ms (${plain(low)} to ${plain(high)}, ${run.frames} frames)`);
-  for (const [name, ms] of Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6)) row(name, `${plain(ms)} ms`, "sub");
+  const dearest = Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6);
+  for (const [name, ms] of dearest) row(name, `${plain(ms)} ms`, "sub");
   row("bake", `${plain(run.bake_ms)} ms${run.bake_cached ? " from the cache" : ""}`);
   row("memory", `${plain(run.bytes / 2 ** 20)} MiB`);
   row("relative RMSE", or(rel_rmse, percent));
@@ -172,7 +178,8 @@ function tell(run, mark) {
   tip.append(table);
   tip.hidden = false;
   const place = mark.getBoundingClientRect(), size = tip.getBoundingClientRect();
-  tip.style.left = `${Math.max(4, place.right + 12 + size.width < innerWidth ? place.right + 12 : place.left - 12 - size.width)}px`;
+  const left = place.right + 12 + size.width < innerWidth ? place.right + 12 : place.left - 12 - size.width;
+  tip.style.left = `${Math.max(4, left)}px`;
   tip.style.top = `${Math.max(4, Math.min(place.top - 20, innerHeight - size.height - 4))}px`;
 }
 
