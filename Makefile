@@ -5,6 +5,7 @@ export XDG_RUNTIME_DIR # unset, it makes Vulkan drivers print noise
 
 BIN := .venv/bin
 DEMO := ear milk gyroid statue leaf
+BENCH := sphere ear milk
 
 .PHONY: help setup demo test bench lint clean
 
@@ -27,8 +28,10 @@ demo: setup ## render pictures into out/
 test: setup ## run the tests
 	@$(BIN)/pytest -q --durations=10
 
-bench: setup ## measure what things cost
+bench: setup ## measure what things cost, and chart speed against accuracy into out/bench/
 	@$(BIN)/python tests/benchmarks.py
+	@mkdir -p out
+	$(BIN)/wgsss bench $(BENCH) -o out/bench
 
 lint: setup ## check style and types
 	$(BIN)/ruff check
