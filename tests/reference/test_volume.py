@@ -19,7 +19,8 @@ from wgsss.methods import make_method
 from wgsss.optics import Layer
 from wgsss.reference import mitsuba_paths
 from wgsss.reference.mitsuba_paths import Paths, newest_llvm
-from wgsss.reference.mitsuba_scene import described, export
+from wgsss.reference.mitsuba_scene import export
+from wgsss.reference.mitsuba_xml import described
 from wgsss.reference.photons import trace
 from wgsss.reference.volume import Volume, _rays
 from wgsss.rendering import Renderer
@@ -130,6 +131,18 @@ def test_lamps_let_light_through_where_the_integrator_can(channel, integrator, b
     assert value(lamp, "radiance") == ([1, 2, 4] if channel is None else [2, 2, 2])
     if bsdf == "diffuse":
         assert value(lamp, "reflectance") == [0, 0, 0]
+
+
+def test_environments_add_up(tmp_path):
+    """Mitsuba has one: constants go into one, and into the image where there is one."""
+    import OpenEXR
+
+    two = ball(SKY, EnvironmentLight((1, 1, 1)))
+    assert value(xml(two), "radiance") == [2, 3, 5]
+    sky = EnvironmentLight((1, 2, 4), file=towards_plus_x(tmp_path / "sky.exr"))
+    export(replace(two, lights=(*two.lights, sky)), tmp_path, (8, 8))
+    found = OpenEXR.File(str(tmp_path / "environment.exr")).channels()["RGB"].pixels
+    assert np.allclose(found - sky.pixels(), (2, 3, 5), rtol=1e-5)
 
 
 # What is refused, and what is told.

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from wgsss.bake.cache import cached
 from wgsss.errors import InputError, RenderError
 from wgsss.reference import mitsuba_render, mitsuba_scene
+from wgsss.reference.mitsuba_xml import described
 from wgsss.scene import Scene
 
 Array = npt.NDArray[Any]
@@ -83,7 +84,7 @@ class Paths:
     def follow(self, channel: int, scatters: bool, samples: int, bar: Any) -> tuple[Array, Array]:
         """Mean radiance (N,) in W/(m^2 sr) of `samples` paths per ray, and the square of its standard error."""
         first, second = np.zeros(len(self._rays)), np.zeros(len(self._rays))
-        xml = mitsuba_scene.described(self._scene, self._size, channel, scatters)
+        xml = described(self._scene, self._size, channel, scatters)
         for number, paths in enumerate(self.batches(samples)):
             # No two batches share random numbers; each ray of a batch takes its own from there.
             seed = ((2 * channel + scatters) << 24) + (number << 6)
