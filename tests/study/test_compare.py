@@ -112,6 +112,9 @@ def test_mean_irradiance_in_closed_form():
     patch = RectLight((0, 500, 0), (0, -1, 0), (0, 0, 1), 10, 10, (1, 1, 1))
     assert mean_irradiance(floor, (patch,)) == pytest.approx(1e-4 / 0.25, rel=1e-3)
     assert mean_irradiance(floor, (EnvironmentLight((1, 2, 3)),)) == pytest.approx(2 * math.pi)
+    wall = Object(plane(4.0, cells=1), MATTE, rotate=(90, 0, 0))  # four times as large, and all in grazing light
+    both = lit(mesh=plane(2.0), extra=(wall,))
+    assert mean_irradiance(both, (DirectionalLight((0, -1, 0), (1, 1, 1)),)) == pytest.approx(0.2)
     light = DirectionalLight((1, 2, -3), (8, 8, 8))
     assert mean_irradiance(ball(), (light,)) == pytest.approx(2.0, rel=0.01)
 

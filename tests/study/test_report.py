@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import browser
+import matplotlib
 import numpy as np
 import OpenEXR
 import pytest
@@ -89,6 +90,7 @@ def test_error_maps_share_a_scale(comparison, folder):
     assert all(pixels.shape == (32, 48, 4) for pixels in shown.values())
     np.testing.assert_array_equal(shown["lambert"][..., 3] > 0, comparison.seen)
     bar = error_maps.bar(1001)[0].astype(int)
+    np.testing.assert_array_equal(bar[500], matplotlib.colormaps["magma"](0.5, bytes=True))
     y, x = np.argwhere(comparison.seen)[40]
     for name, pixels in shown.items():
         at = round(1000 * math.sqrt(min(maps[name][y, x] / end, 1.0)))
@@ -180,7 +182,9 @@ def test_page_in_a_browser(tab):
     assert left == pytest.approx(x + width / 4, abs=2)
     tab.run("document.getElementById('handle').focus()")
     tab.press("ArrowRight")
-    assert tab.run(now) == 26
+    tab.press("ArrowUp")
+    tab.press("PageDown")
+    assert tab.run(now) == 17
     tab.press("End")
     assert tab.run(now) == 100
 
@@ -200,7 +204,9 @@ def test_page_in_a_browser(tab):
     tab.run(f"{choose}('a', 4)")
     assert tab.run("document.getElementById('tag-a').textContent") == "lambert: error"
     assert tab.run(sources)[0] not in (over, under)
+    before = tab.run(sources)
     tab.run(f"{choose}('light', 1)")
+    assert before[1] != tab.run(sources)[1]
     assert tab.run("document.querySelectorAll('#figures tbody tr').length") == 2
     assert tab.run("document.getElementById('title').textContent") == f"{NAME} against integral"
     assert tab.run("[...document.images].every((i) => i.complete && i.naturalWidth > 0)")

@@ -1,8 +1,8 @@
 """Where a method's error against volumetric transport comes from.
 
 Between a method and the volume stand three integrals of 000 eq. 5: with the profile that the method was given, with the
-profile that photons tell of the same material, and the same where the object shadows its sky. Each step of that chain
-has one cause.
+profile that photons tell of the same material, and the same with many suns in place of the sky, whose shadows are as
+sharp as any. Each step of that chain has one cause.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ Array = npt.NDArray[Any]
 MEANINGS = {
     "method": "how the integral is approximated",
     "profile": "how R was modelled",
-    "occlusion": "L_d knows no shadow of the environment",
-    "diffusion": "light below a curved surface is not that below a plane, and what else the integral leaves out",
+    "occlusion": "L_d knows the environment's shadows by what is baked at vertices",
+    "diffusion": "light below a curved surface is not that below a plane; also what else the integral leaves out, and the \
+volume's own error",
 }
 CAUSES = tuple(MEANINGS)
 """from the method to the volume, one for each step of the chain"""
