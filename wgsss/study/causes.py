@@ -27,8 +27,7 @@ MEANINGS = {
     "method": "how the integral is approximated",
     "profile": "how R was modelled",
     "occlusion": "L_d knows the environment's shadows by what is baked at vertices",
-    "diffusion": "light below a curved surface is not that below a plane; also what else the integral leaves out, and the \
-volume's own error",
+    "diffusion": "light below a curved surface is not that below a plane; also all else, and the volume's own error",
 }
 CAUSES = tuple(MEANINGS)
 """from the method to the volume, one for each step of the chain"""
