@@ -18,6 +18,7 @@ from wgsss.errors import InputError, RenderError
 from wgsss.methods import make_method
 from wgsss.optics import Layer
 from wgsss.reference import mitsuba_paths
+from wgsss.reference.integral import integral
 from wgsss.reference.mitsuba_paths import Paths, newest_llvm
 from wgsss.reference.mitsuba_scene import export
 from wgsss.reference.mitsuba_xml import described
@@ -312,7 +313,6 @@ LIGHTS = {
     "point": PointLight((30, 20, 25), (0.001, 0.002, 0.004)),
     "rect": RectLight((20, 10, 30), (-2, -1, -3), (0, 1, 1), 10, 24, (1, 2, 4), samples=64),
     "sphere": SphereLight((20, 10, 25), 6, (1, 2, 4), samples=64),
-    "environment": SKY,
     "image": EnvironmentLight((1, 2, 4), file="", rotation=40),
 }
 
@@ -325,7 +325,7 @@ def test_lights(mi, gpu, name, tmp_path):
     if name == "image":
         light = replace(light, file=towards_plus_x(tmp_path / "sky.exr"))
     camera = OrthographicCamera((30, 20, 40), (0, 0, 0), height=16.0)
-    scene, size = ball(light, camera=camera, mesh=shapes.sphere(10.0, 20_000)), (6, 6)
+    scene, size = ball(light, camera=camera, mesh=shapes.sphere(10.0, 6000)), (6, 6)
     file, *_ = export(scene, tmp_path, size)
     tree = ElementTree.parse(file)
     shape = tree.find("shape")
@@ -437,6 +437,27 @@ def test_slab_of_photons(gpu):
     assert (error < 0.06 * wanted).all()
     assert np.abs(found - wanted).max() < 4 * error.max()
     assert (np.abs(found - wanted) < 3.5 * error).all()
+
+
+@needs_mitsuba
+@pytest.mark.parametrize(
+    ("light", "most"), [(EnvironmentLight((1, 1, 1)), 0.13), (DirectionalLight((-1, 0, 0), (1, 1, 1)), 0.2)]
+)
+def test_ball_by_the_profile_of_photons(gpu, light, most):
+    """On a ball of milk, ten mean free paths in radius, the profile of a half space errs by 11 % under a sky and by
+    19 % under a beam from the side, RMS, besides the noise."""
+    milk = replace(material("wholemilk"), eta=1.0)
+    radius = 10 / (3.21 + 0.0024)
+    camera = OrthographicCamera((0, 0, 9 * radius), (0, 0, 0), height=2.05 * radius)
+    stage = Stage(gpu, ball(light, medium=milk, camera=camera, mesh=shapes.sphere(radius, 2000)))
+    photons = trace(milk.stack, 30_000, gpu=gpu)
+    truth = Volume(samples=256).estimate(stage, (12, 12))
+    profile = integral(stage, (12, 12), profiles={0: photons})
+    seen = truth.M.max(axis=2) > 0
+    square, noise = (np.square(part[seen]).mean() for part in (profile.M - truth.M, truth.error))
+    errs = math.sqrt(max(square - noise, 0.0) / np.square(truth.M[seen]).mean())
+    assert 0.03 < errs < most
+    assert 0.7 < profile.M[seen].mean() / truth.M[seen].mean() < 1.0  # it gives back what a half space keeps
 
 
 @needs_mitsuba
