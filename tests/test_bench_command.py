@@ -55,6 +55,7 @@ def test_text_has_a_row_per_run_and_the_files(done: list[Spec], tmp_path: Path, 
     assert sorted(path.name for path in (tmp_path / "bench").iterdir()) == FILES
     assert files.split() == [f"bench/chart.{ending}" for ending in ("svg", "png", "html")]
     assert len(err.splitlines()) == len(done) == 10  # a line per run, as it ends
+    assert err.startswith("slab by lambert: 10.00 ms, error 10 %\nslab by deon07 map_size=256 gaussians=6: 20.00 ms")
 
 
 def test_json_has_the_runs(done: list[Spec], capsys):

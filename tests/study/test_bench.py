@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from wgsss.errors import InputError, RenderError
@@ -16,7 +17,7 @@ from wgsss.methods import METHODS
 from wgsss.methods.lambert import Lambert
 from wgsss.reference import REFERENCES, Estimate, Reference
 from wgsss.rendering import Renderer
-from wgsss.scene import Scene, load_scene
+from wgsss.scene import EnvironmentLight, Scene, load_scene
 from wgsss.stage import Stage
 from wgsss.study import run as runs_of
 from wgsss.study.bench import FILE, bench, read
@@ -149,7 +150,7 @@ def test_a_fault_says_which_run_it_was(ball: Scene, monkeypatch: pytest.MonkeyPa
         measure(ball, Spec("sphere", digest(ball), "lambert", {}, 0, SIZE, "twice"))
 
 
-def test_a_digest_stands_for_all_of_a_scene(ball: Scene) -> None:
+def test_a_digest_stands_for_all_of_a_scene(ball: Scene, tmp_path: Path) -> None:
     thing = ball.objects[0]
     moved = thing.mesh.positions.copy()
     moved[7, 1] += 1e-3
@@ -163,6 +164,14 @@ def test_a_digest_stands_for_all_of_a_scene(ball: Scene) -> None:
     ]
     assert digest(ball) == digest(load_scene("sphere", vertices=300))
     assert len({digest(scene) for scene in (ball, *others)}) == 1 + len(others)
+    image = tmp_path / "sky.exr"
+    skies = []
+    for value in (0.5, 0.6):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with OpenEXR.File(header, {"RGB": np.full((2, 4, 3), value, np.float32)}) as exr:
+            exr.write(str(image))
+        skies.append(digest(replace(ball, lights=(EnvironmentLight(file=str(image)),))))
+    assert skies[0] != skies[1]
 
 
 # a sweep, and what is left of one

@@ -11,6 +11,19 @@ from wgsss.cli.compare import names
 
 _SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
 _FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
+_HEAD = [
+    "scene",
+    "method",
+    "knobs",
+    "bake, ms",
+    "frame, ms",
+    "middle half",
+    "MB",
+    "error, %",
+    "PSNR, dB",
+    "FLIP",
+    "bias",
+]
 _SCHEDULER = "of a Dask cluster to run on (default: run here)"
 
 
@@ -51,12 +64,13 @@ def run(args: Any) -> None:
 def _tell(run: dict[str, Any]) -> None:
     """A line per run where no bar shows how far it is."""
     if not sys.stderr.isatty():
-        print("  ".join(cell for cell in _row(run) if cell), file=sys.stderr, flush=True)
+        cells = dict(zip(_HEAD, _row(run), strict=True))
+        setting = " ".join(filter(None, (cells["scene"], "by", cells["method"], cells["knobs"])))
+        print(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %", file=sys.stderr, flush=True)
 
 
 def _rows(runs: list[dict[str, Any]]) -> list[list[str]]:
-    head = ["scene", "method", "knobs", "bake, ms", "frame, ms", "middle half", "MB", "error, %", "PSNR, dB", "FLIP"]
-    return [[*head, "bias"], *(_row(run) for run in runs)]
+    return [_HEAD, *(_row(run) for run in runs)]
 
 
 def _row(run: dict[str, Any]) -> list[str]:

@@ -23,7 +23,7 @@ from wgsss.errors import InputError, RenderError
 from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
 from wgsss.rendering import Renderer
-from wgsss.scene import Scene
+from wgsss.scene import EnvironmentLight, Scene
 from wgsss.study.compare import footprint, make_reference
 from wgsss.study.metrics import errors
 
@@ -141,7 +141,7 @@ def version() -> str:
 
 
 def digest(scene: Scene) -> str:
-    """A name for a scene's content: meshes, materials, lights and camera, by all their fields."""
+    """A name for a scene's content: meshes, materials, lights with their images, and camera, by all their fields."""
     found = hashlib.sha256()
 
     def add(value: Any) -> None:
@@ -150,6 +150,8 @@ def digest(scene: Scene) -> str:
             found.update(np.ascontiguousarray(value).tobytes())
         elif is_dataclass(value):
             add([type(value).__name__, *((f.name, getattr(value, f.name)) for f in fields(value))])
+            if isinstance(value, EnvironmentLight):
+                add(value.pixels())
         elif isinstance(value, tuple | list):
             found.update(f"{len(value)}(".encode())
             for item in value:
