@@ -138,7 +138,7 @@ def test_the_reference_is_computed_once_per_scene(ball: Scene, tmp_path: Path, m
     Twice.estimated.clear()
     other = replace(ball, name="other", exposure=1.0)
     bench([ball, other], ["lambert"], tmp_path, SIZE, reference="twice")
-    assert Twice.estimated == ["sphere", "other"]
+    assert Twice.estimated == ["sphere", "other"] and len(runs_of._last) == 1  # the last scene only is kept
 
 
 def test_a_fault_says_which_run_it_was(ball: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
