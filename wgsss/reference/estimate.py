@@ -39,7 +39,8 @@ class Reference(Method, Protocol):
         """M of the scene as posed at `size` (width, height) pixels, cached. May take minutes; shows how far it is."""
 
     def bake(self, stage: Stage) -> None:
-        """Nothing."""
+        """Nothing: what depends on meshes alone is a part of `estimate`."""
+        return None
 
     def passes(self, frame: Frame) -> Diffused:
         estimate = self.estimate(frame.stage, frame.size)
