@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scenes import ABOVE, MATTE, lit, plane
 from scipy.integrate import quad
+from scipy.ndimage import gaussian_filter
 
 from wgsss.bake.samples import Samples
 from wgsss.gpu import Gpu
@@ -19,9 +20,9 @@ from wgsss.methods import make_method
 from wgsss.optics import SKIN_GAUSSIANS, NormalizedDiffusion, Profile, SumOfGaussians
 from wgsss.reference import REFERENCES, convergence, surface_sum
 from wgsss.reference import integral as reference
-from wgsss.reference.convergence import RADIUS, at_spacing, irradiance_at
+from wgsss.reference.convergence import at_spacing, irradiance_at
 from wgsss.reference.integral import Integral, at_vertices, integral
-from wgsss.reference.kernel import make_kernel
+from wgsss.reference.kernel import BLUR, RADIUS, Kernel, make_kernel
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     DirectionalLight,
@@ -64,22 +65,45 @@ def rms(values: Any) -> Any:
     return np.sqrt(np.square(values).mean(axis=0))
 
 
+def distances(kernel: Kernel) -> Any:
+    """Of a kernel's rows, mm."""
+    bits = kernel.first + np.arange(len(kernel.table) // 2, dtype=np.uint32)
+    return np.sqrt((bits << 15).view(np.float32).astype(float))
+
+
 @pytest.mark.parametrize("profile", [WIDE, SKIN_GAUSSIANS, BURLEY, material("skin1").profile])
-@pytest.mark.parametrize("radius", [0.1, 1.0])
-def test_a_kernel_holds_all_light(profile: Profile, radius: float) -> None:
+@pytest.mark.parametrize("spacing", [0.1, 1.0])
+def test_a_kernel_holds_all_light(profile: Profile, spacing: float) -> None:
     """Over the plane: what is taken as near, against a quadrature, and with what is sampled the total."""
-    kernel = make_kernel(profile, radius, 1e9)
+    kernel, radius = make_kernel(profile, spacing, 1e9), RADIUS * spacing
     for channel in range(3):
 
         def ring(r: float, channel: int = channel) -> float:
             return float(2 * np.pi * r * profile.reflectance(r)[channel] * (1 - (r / radius) ** 2) ** 3)
 
         near = quad(ring, 0, radius, limit=200, epsabs=1e-9)[0]
-        assert kernel.near[channel] == pytest.approx(near, abs=2e-5)
-    squares = ((kernel.first + np.arange(len(kernel.table), dtype=np.uint32)) << 15).view(np.float32).astype(float)
-    sampled = kernel.table[:, :3].astype(float) * kernel.table[:, 3:]
-    beyond = np.pi * np.trapezoid(sampled, squares, axis=0)
-    np.testing.assert_allclose(kernel.near + beyond, profile.total, atol=5e-5)
+        assert kernel.near[channel] == pytest.approx(near, abs=3e-5 * profile.total[channel])
+    r = distances(kernel)
+    same, opposite = kernel.table[:, :3].astype(float).reshape(2, len(r), 3)
+    beyond = np.pi * (same[0] * r[0] ** 2 + np.trapezoid(same, np.square(r), axis=0))
+    np.testing.assert_allclose(kernel.near + beyond, profile.total, rtol=2e-4)
+    np.testing.assert_allclose(opposite[:-1], profile.reflectance(r[:-1]), rtol=1e-5, atol=1e-12)
+    np.testing.assert_array_equal(kernel.table[len(r) - 1 :: len(r)], 0)
+
+
+def test_what_is_sampled_is_blurred_over_the_plane() -> None:
+    """Against a blur of an image of it."""
+    spacing, step = 1.0, 1 / 30
+    x = np.arange(-240, 241) * step
+    r = np.hypot(x, x[:, None])
+    chi = np.maximum(1 - np.square(r / (RADIUS * spacing)), 0) ** 3
+    image = SKIN_GAUSSIANS.reflectance(r)[..., 0] * (1 - chi)
+    blurred = gaussian_filter(image, BLUR * spacing / step, truncate=8)[240, 240:]
+    kernel = make_kernel(SKIN_GAUSSIANS, spacing, 1e9)
+    found = np.interp(x[240:], distances(kernel), kernel.table[: len(kernel.table) // 2, 0])
+    near = x[240:] < 4
+    assert abs(blurred - image[240, 240:])[near].max() > 0.2 * image.max()
+    np.testing.assert_allclose(found[near], blurred[near], rtol=0.01, atol=1e-4 * image.max())
 
 
 def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
@@ -95,17 +119,17 @@ def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
 
     samples, places = points(count), points(receivers)
     flux = rng.random((count, 3)).astype(np.float32)
-    radius = 0.2
-    kernel = make_kernel(WIDE, radius, 1e3)
+    kernel = make_kernel(WIDE, 0.5, 1e3)
+    squares = np.square(distances(kernel))
     assert kernel.reach < 12
     found = surface_sum.surface_sum(gpu, kernel, samples, flux, places, Bar())
     expected = np.zeros((2, receivers, 3))
     for i in range(receivers):
         d = samples.position.astype(float) - places.position[i]
         facing = samples.normal.astype(float) @ places.normal[i]
-        r = np.linalg.norm(d, axis=1)
-        chi = np.where((r < radius) & (facing >= 0), (1 - np.minimum(r / radius, 1) ** 2) ** 3, 0)
-        M = WIDE.reflectance(r) * (1 - chi)[:, None] * flux
+        square = np.square(d).sum(axis=1)
+        same = [np.interp(square, squares, kernel.table[: len(squares), c]) for c in range(3)]
+        M = np.where((facing >= 0)[:, None], np.stack(same, axis=1), WIDE.reflectance(np.sqrt(square))) * flux
         back = (d @ places.normal[i] < 0) & (facing < 0)
         expected[:, i] = M[~back].sum(axis=0), M[back].sum(axis=0)
     # Here and there the profile's range cuts off what falls behind it, 1e-5 of its light.
@@ -135,7 +159,7 @@ def test_uniformly_lit_sphere(gpu: Gpu) -> None:
     np.testing.assert_allclose(behind.mean(axis=0), back.mean(axis=0), rtol=0.01)
 
 
-@pytest.mark.parametrize(("thickness", "vertices"), [(2.0, 6000), (0.5, 3000)])
+@pytest.mark.parametrize(("thickness", "vertices"), [(2.0, 6000), (0.3, 3000)])
 def test_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> None:
     """The thin one is thinner than the radius within which samples give way to a plane: its far face must not."""
     below = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=2)
@@ -144,7 +168,7 @@ def test_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> 
     stage = Stage(gpu, scene)
     places = Samples(*_under(scene.objects[0].mesh, thickness / 2))
     spacing = 0.5
-    assert (RADIUS * spacing > thickness) == (thickness == 0.5)
+    assert (RADIUS * spacing > thickness) == (thickness == 0.3)
     found = at_spacing(stage.bodies[0], places, np.zeros((len(places.face), 3)), WIDE, spacing)
     np.testing.assert_array_equal(found.front, 0)
     expected = 2.0 * WIDE.total * WIDE.beyond(thickness)

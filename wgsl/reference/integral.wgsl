@@ -31,7 +31,7 @@ struct Sums {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> kernel: array<vec4f>; // R_d, 1/mm^2; how much of it is sampled on the same sheet
+@group(0) @binding(1) var<storage, read> kernel: array<vec4f>; // 1/mm^2: for the receiver's sheet, then for opposite ones
 @group(0) @binding(2) var<storage, read> samples: array<Sample>;
 @group(0) @binding(3) var<storage, read> receivers: array<Receiver>;
 @group(0) @binding(4) var<storage, read> starts: array<u32>;   // of the groups' lists
@@ -41,7 +41,7 @@ struct Sums {
 @compute @workgroup_size(LANES)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let receiver = receivers[(params.first_group + group.x) * LANES + lane];
-    let last = arrayLength(&kernel) - 2u;
+    let last = arrayLength(&kernel) / 2u - 2u;
     var total = Sums(vec3f(0.0), vec3f(0.0));
     for (var j = starts[group.x]; j < starts[group.x + 1u]; j++) {
         var part = Sums(vec3f(0.0), vec3f(0.0));
@@ -52,10 +52,11 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
             let wanted = max(bits >> SHIFT, params.first_entry) - params.first_entry;
             let entry = min(wanted, last);
             let between = f32(bits & ((1u << SHIFT) - 1u)) / f32(1u << SHIFT);
-            let R = mix(kernel[entry], kernel[entry + 1u], select(between, 1.0, wanted > last));
             let opposed = dot(sample.normal, receiver.normal) < 0.0;
             let is_back = opposed && dot(d, receiver.normal) < 0.0;
-            let M = sample.flux * R.rgb * select(R.a, 1.0, opposed);
+            let at = entry + select(0u, last + 2u, opposed);
+            let R = mix(kernel[at], kernel[at + 1u], select(between, 1.0, wanted > last));
+            let M = sample.flux * R.rgb;
             part.front += select(M, vec3f(0.0), is_back);
             part.back += select(vec3f(0.0), M, is_back);
         }

@@ -20,9 +20,8 @@ from wgsss.stage import Body
 
 Array = npt.NDArray[Any]
 
-RADIUS = 3.0
-"""Spacings within which L_d is taken as the same all over: with fewer, samples miss narrow profiles."""
-_RESOLVED = 0.1  # share of the light that leaves outside of that radius from the start, in the widest channel
+_WIDTH = 3.0  # spacings at least within which all light leaves that counts, in the widest channel
+_RESOLVED = 0.1  # but for this share
 _POINTS = 1 << 18  # whose L_d one pass gathers
 
 
@@ -33,7 +32,7 @@ def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float
     """
     L_d = irradiance_at(body, receivers)
     width = float(profile.range(_RESOLVED).max()) if profile.total.any() else np.inf
-    spacing = _first_spacing(body.mesh, width / RADIUS, samples)
+    spacing = _first_spacing(body.mesh, width / _WIDTH, samples)
     last = at_spacing(body, receivers, L_d, profile, spacing)
     while True:
         spacing /= 2
@@ -41,7 +40,7 @@ def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float
         found.error = np.abs(found.front + found.back - last.front - last.back)
         size = np.sqrt(np.square(found.front + found.back).mean(axis=0))
         moved = float((np.sqrt(np.square(found.error).mean(axis=0)) / np.where(size > 0, size, 1.0)).max())
-        resolved = RADIUS * spacing <= width
+        resolved = _WIDTH * spacing <= width
         if (enough := moved <= tolerance and resolved) or _count(body.mesh, spacing / 2) > samples:
             change = f"still moves by {100 * moved:.2g} % from {last.samples} to {found.samples} samples"
             why = change if resolved else f"is of samples {spacing:.2g} mm apart, too far for the material"
@@ -61,7 +60,7 @@ def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spa
     chosen = subdivided(mesh, spacing)
     there, here = body.at(chosen), body.at(receivers)
     flux = irradiance_at(body, chosen) * there.area[:, None]
-    kernel = make_kernel(profile, RADIUS * spacing, across)
+    kernel = make_kernel(profile, spacing, across)
     total = len(flux) * len(L_d)
     label = f"{mesh.name}, {len(flux)} samples"
     with tqdm(total=total, desc=label, unit=" pairs", unit_scale=True, file=sys.stderr, disable=None) as bar:
