@@ -70,6 +70,16 @@ def test_a_reference_against_itself_has_no_error():
     assert run.errors.json()["psnr"] is None
 
 
+def test_a_reference_works_once(monkeypatch):
+    asked = []
+    estimate = Scaled.estimate
+    monkeypatch.setattr(Scaled, "estimate", lambda self, *where: asked.append(where) or estimate(self, *where))
+    found = compare(lit(SUN), ["lambert"], size=SIZE)
+    assert len(asked) == 1
+    assert found.image.metadata["method"] == "integral" and found.image.metadata["knobs"] == f"factor={FACTOR}"
+    np.testing.assert_array_equal(found.image.aovs["M_front"], found.truth.M)
+
+
 def test_in_the_dark_nothing_is_relative():
     (run,) = compare(lit(), ["lambert"], size=SIZE).runs
     assert run.errors.rel_rmse is None and run.errors.bias is None and run.errors.flip == 0.0
