@@ -53,7 +53,7 @@ def test_lights_of_all_types(tmp_path: Path, capsys):
     argv = [*SMALL, "--lights", "all", "-o", str(tmp_path / "here")]
     rows = run(capsys, *argv)[0].split("by type of light: rel RMSE\n")[1].splitlines()
     assert rows[0].split() == ["method", "directional", "point", "area", "environment"]
-    assert rows[1].split() == ["lambert", *["20", "%"] * 4]
+    assert rows[1].split() == ["lambert", *["20", "%"] * 4] and rows[2].split() == ["(integral)", *["1.6", "%"] * 4]
     numbers = json.loads((tmp_path / "here" / "metrics.json").read_text())
     assert list(numbers["lights"]) == ["directional", "point", "area", "environment"]
     assert numbers["lights"]["area"][0]["method"] == "lambert"

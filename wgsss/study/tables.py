@@ -41,11 +41,12 @@ def by_cause(comparison: Comparison) -> list[list[str]]:
 
 
 def by_light(comparison: Comparison) -> list[list[str]]:
-    """rel_rmse of each method under each type of light."""
+    """rel_rmse of each method under each type of light, and what the reference's own error accounts for."""
     rows = [["method", *comparison.lights]]
     for i, run in enumerate(comparison.runs):
         rows.append([run.name, *(percent(other.runs[i].errors.rel_rmse) for other in comparison.lights.values())])
-    return rows
+    floors = [percent(other.runs[0].errors.floor) for other in comparison.lights.values()]
+    return [*rows, [f"({comparison.reference})", *floors]]
 
 
 def floor(comparison: Comparison) -> str:
