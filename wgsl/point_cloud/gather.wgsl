@@ -17,6 +17,8 @@ struct Params {
 
 // Turns of one loop that every driver grants.
 const TURNS: u32 = 32768u;
+// Of the length of a normal.
+const ROUNDING: Number = 1e-6;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> surface: Surface;
@@ -47,10 +49,11 @@ fn reflectance(squared: f32) -> vec3f {
 }
 
 // The share of a node whose normals, of this mean, turn away from n_o: as if their cosines were spread evenly about
-// theirs. All or nothing for a sample.
+// theirs. All or nothing for a sample, and nothing at a right angle.
 fn facing_away(mean: vec3f, n_o: Direction) -> Number {
-    let spread = sqrt(1.5 * max(1.0 - dot(mean, mean), 0.0)); // of even cosines whose variance is a half of what is left
-    return clamp(0.5 - 0.5 * dot(mean, n_o) / max(spread, 1e-3), 0.0, 1.0);
+    let varied = max(1.0 - dot(mean, mean) - ROUNDING, 0.0);
+    let spread = sqrt(1.5 * varied); // of even cosines whose variance is a half of that
+    return clamp(0.5 * (spread - dot(mean, n_o) - ROUNDING) / max(spread, 1e-10), 0.0, 1.0);
 }
 
 @fragment

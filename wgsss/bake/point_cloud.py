@@ -12,6 +12,7 @@ import numpy.typing as npt
 from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.octree import Octree, morton, octree
 from wgsss.bake.samples import Samples, subdivided
+from wgsss.errors import InputError
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -36,8 +37,11 @@ class PointCloud:
 def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
     """Samples of `mesh`, one to each `spacing` x `spacing` mm^2, cached.
 
-    There are at most MOST of them: where that is too few, a warning says what spacing they have instead.
+    There are at most MOST of them: where that is too few, a warning says what spacing they have instead. Raises
+    InputError for a mesh without an area.
     """
+    if not mesh.area > 0.0:
+        raise InputError(f"{mesh.name}: the mesh has no area to spread samples over")
     wanted = mesh.area / spacing**2
     if wanted > MOST:
         coarser = float(np.sqrt(mesh.area / MOST))
@@ -53,7 +57,7 @@ def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
         return {f.name: getattr(part, f.name) for part in (samples, tree) for f in fields(part)}
 
     key: list[KeyPart] = [mesh.positions, mesh.faces, spacing]
-    label = f"spreading {max(wanted, 1):.0f} samples over {mesh.name}"
+    label = f"spreading {mesh.area / spacing**2:.0f} samples over {mesh.name}"
     arrays = cached("point_cloud", key, make, code=[Mesh, Samples, Octree], label=label)
     samples = Samples(**{f.name: arrays[f.name] for f in fields(Samples)})
     tree = Octree(**{f.name: arrays[f.name] for f in fields(Octree)})
@@ -67,12 +71,26 @@ def _make(mesh: Mesh, spacing: float) -> tuple[Samples, Octree]:
     parts, area = Samples(parts.face[keep], parts.barycentric[keep], parts.share[keep]), area[keep]
     corners = mesh.positions[mesh.faces].astype(np.float64)
     x = np.einsum("nk,nkd->nd", parts.barycentric, corners[parts.face])
-    chosen, cell = _spread(x, _normals(mesh)[parts.face], area, spacing)
-    tree, order = octree(x[chosen])
-    chosen = chosen[order]
+    site, size, middle = _spread(x, _normals(mesh)[parts.face], area, spacing)
+    face = parts.face[site]
+    barycentric = _above(corners[face], middle, parts.barycentric[site])
+    tree, order = octree(np.einsum("nk,nkd->nd", barycentric, corners[face]))
     # A sample's area, as a share of its own face, moves with the face.
-    own = np.linalg.norm(mesh.face_normals, axis=1)[parts.face[chosen]] / 2
-    return Samples(parts.face[chosen], parts.barycentric[chosen], cell[order] / own), tree
+    share = size / (np.linalg.norm(mesh.face_normals, axis=1)[face] / 2)
+    return Samples(face[order], barycentric[order], share[order]), tree
+
+
+def _above(corners: Array, x: Array, otherwise: Array) -> Array:
+    """Barycentric coordinates (N, 3) of what x (N, 3) is above on triangles (N, 3, 3), or of a place near it inside;
+    `otherwise` on triangles too thin to tell."""
+    first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
+    a, b, c = (np.einsum("nd,nd->n", *pair) for pair in ((first, first), (first, second), (second, second)))
+    u, v = (np.einsum("nd,nd->n", edge, x - corners[:, 0]) for edge in (first, second))
+    size = a * c - b * b
+    sound = size > 1e-9 * a * c
+    inside = np.stack([c * u - b * v, a * v - b * u], axis=1) / np.where(sound, size, 1.0)[:, None]
+    found = np.maximum(np.column_stack([1.0 - inside.sum(axis=1), inside]), 0.0)
+    return np.where(sound[:, None], found / found.sum(axis=1, keepdims=True), otherwise)
 
 
 def _parts(mesh: Mesh, spacing: float) -> Samples:
@@ -90,13 +108,13 @@ def _normals(mesh: Mesh) -> Array:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
-def _spread(x: Array, normal: Array, area: Array, spacing: float) -> tuple[Array, Array]:
-    """Which parts at `x` (P, 3) are samples, and the area nearest to each.
+def _spread(x: Array, normal: Array, area: Array, spacing: float) -> tuple[Array, Array, Array]:
+    """Cells of parts at `x` (P, 3): which part is in the middle of each, the cells' areas and their centroids.
 
-    Lloyd's relaxation: from a start with equal areas between samples along a space-filling curve, each sample moves to
-    the part nearest to the centroid of the parts that are nearest to it. The evenness is that of Turk's repulsion,
-    and at centroids a sum over samples is right to second order. What faces another way is far: the two sides of a thin
-    sheet have samples of their own.
+    Lloyd's relaxation: from a start with equal areas between sites along a space-filling curve, each site moves to the
+    part nearest to the centroid of the parts that are nearest to it. The evenness is that of Turk's repulsion, and a
+    sum over centroids is right to second order. What faces another way is far: the two sides of a thin sheet have
+    cells of their own.
     """
     from scipy.spatial import KDTree
 
@@ -104,17 +122,18 @@ def _spread(x: Array, normal: Array, area: Array, spacing: float) -> tuple[Array
     count = min(max(round(float(area.sum()) / spacing**2), 1), len(x))
     along = np.argsort(morton(x), kind="stable")
     reached = np.cumsum(area[along])
-    chosen = along[np.unique(np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1]))]
+    site = along[np.unique(np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1]))]
     for last in [False] * _ROUNDS + [True]:
-        nearest = KDTree(where[chosen]).query(where, workers=-1)[1]
-        cell = np.bincount(nearest, area, len(chosen))
+        cell = KDTree(where[site]).query(where, workers=-1)[1]
+        size = np.bincount(cell, area, len(site))
+        moments = [np.bincount(cell, area * column, len(site)) for column in where.T]
+        middle = np.stack(moments, axis=1) / np.maximum(size, 1e-300)[:, None]
         if last:
             break
-        weighted = [np.bincount(nearest, area * column, len(chosen)) / np.maximum(cell, 1e-300) for column in where.T]
-        off = np.square(where - np.stack(weighted, axis=1)[nearest]).sum(axis=1)
-        least = np.full(len(chosen), np.inf)
-        np.minimum.at(least, nearest, off)
-        at = np.flatnonzero(off == least[nearest])
-        chosen[nearest[at]] = at
-    kept = cell > 0.0  # of two at one place, one has all
-    return chosen[kept], cell[kept]
+        off = np.square(where - middle[cell]).sum(axis=1)
+        least = np.full(len(site), np.inf)
+        np.minimum.at(least, cell, off)
+        nearest = np.flatnonzero(off == least[cell])
+        site[cell[nearest]] = nearest
+    kept = size > 0.0  # of two at one place, one has all
+    return site[kept], size[kept], middle[kept, :3]

@@ -136,7 +136,7 @@ class PointCloud:
 
 def mean_free_path(material: Material) -> float:
     """1/(sigma_a + sigma_s') in mm, of the top layer; where only the profile is known, the distance within which half
-    of the light leaves. Of the channels the middle one: the pixel's own light stands in for what is narrower in another.
+    of the light leaves. Of the channels the middle one: what is narrower in another is left to the pixel.
     """
     if material.stack is None:
         return float(np.median(material.profile.range(0.5)))
