@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 _PAPER, _BEHIND, _INK, _FAINT, _MARK = "#16161a", "#2b2b31", "#f2f2f4", "#a0a0aa", "#5fd0ff"
-# Inches.
-_CELL, _GAP, _EDGE, _HEAD, _WORDS = 2.7, 0.1, 0.25, 0.62, 1.65
+# Inches. A row is at least as high as its words.
+_CELL, _LEAST, _GAP, _EDGE, _HEAD, _WORDS = 2.7, 1.9, 0.1, 0.25, 0.62, 1.65
 
 
 def draw(comparison: Comparison, path: Path) -> None:
@@ -27,7 +27,8 @@ def draw(comparison: Comparison, path: Path) -> None:
     from matplotlib.figure import Figure
 
     aspect = comparison.size[0] / comparison.size[1]
-    wide, high = (_CELL, _CELL / aspect) if aspect > 1.0 else (_CELL * aspect, _CELL)
+    high = max(_CELL / max(aspect, 1.0), _LEAST)
+    wide = high * aspect
     columns = [_WORDS, wide, wide, high, high]
     width = sum(columns) + 4 * _GAP + 2 * _EDGE
     height = _HEAD + (len(comparison.runs) + 1) * (high + _GAP) + 0.25 + _EDGE
