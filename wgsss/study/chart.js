@@ -99,7 +99,7 @@ function drawPanel(panel) {
     svg(picture, "line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: y(v), y2: y(v) });
     svg(picture, "text", { x: LEFT - 7, y: y(v) + 4, "text-anchor": "end" }, metric.form(v));
   }
-  if (floor > 0) svg(picture, "text", { x: LEFT + 6, y: band.y + 15 }, "the reference's own error");
+  if (floor > 0) svg(picture, "text", { x: LEFT + 6, y: bottom - 6 }, "the reference's own error");
   svg(picture, "text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, "frame time, ms");
   svg(picture, "text", { transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)`, ...middle }, metric.name);
 

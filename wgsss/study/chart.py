@@ -235,14 +235,8 @@ def _scales(axis: Axes, shown: Sequence[Run], points: Sequence[tuple[float, floa
         one.set_ticks([], minor=True)
     if floor > 0.0:
         axis.axhspan(axis.get_ylim()[0], floor, color=_FLOOR, lw=0, zorder=0)
-        corner: dict[str, Any] = {
-            "xytext": (4, -4),
-            "textcoords": "offset points",
-            "va": "top",
-            "fontsize": 8,
-            "color": _FAINT,
-        }
-        axis.annotate("the reference's own error", (axis.get_xlim()[0], floor), **corner)
+        corner: dict[str, Any] = {"xytext": (4, 4), "textcoords": "offset points", "fontsize": 8, "color": _FAINT}
+        axis.annotate("the reference's own error", (axis.get_xlim()[0], axis.get_ylim()[0]), **corner)
 
 
 def _place_labels(axis: Axes, wanted: Sequence[Label]) -> None:
