@@ -30,7 +30,7 @@ Array = npt.NDArray[Any]
 
 NEAR = 1.5
 """Within this many spacings of x_o, the profile is blunted to what samples resolve; see the test of a plane."""
-_ENTRIES = 1024  # of the table of R_d
+_ENTRIES = 4096  # of the table of R_d
 _BEYOND = 1e-5  # share of the light that is left out for being far
 
 
