@@ -251,6 +251,27 @@ def test_light_stays_in_the_object_it_entered(gpu: Gpu) -> None:
     np.testing.assert_array_equal(found.M, 0)
 
 
+def test_pixels_of_a_half_lit_plane(gpu: Gpu) -> None:
+    """Of two triangles: where on them a pixel is matters."""
+    color = np.zeros((1, 1000, 3), np.uint8)
+    color[:, 500:] = 255
+    striped = replace(SOFT, color_after=0.0, maps=replace(MATTE.maps, base_color=color))
+    found = integral(Stage(gpu, lit(SUN, mesh=plane(cells=1), material=striped)), (16, 16), tolerance=0.02)
+    expected = 2.0 * WIDE.step_response((np.arange(16) + 0.5) * 20 / 16 - 10)
+    np.testing.assert_allclose(found.M, np.broadcast_to(expected, (16, 16, 3)), atol=0.01 * expected.max())
+
+
+def test_each_object_has_its_own_profile(gpu: Gpu) -> None:
+    """Two planes side by side, each lit alike all over."""
+    scene = lit(SUN, extra=(Object(plane(10), SOFT, translate=(5.5, 0, 0)),))
+    scene = replace(scene, objects=(Object(plane(10), SOFT, translate=(-5.5, 0, 0)), *scene.objects[1:]))
+    profiles = {i: SumOfGaussians(np.array([0.5]), np.full((1, 3), 0.3 + 0.4 * i)) for i in (0, 1)}
+    found = integral(Stage(gpu, scene), (8, 8), profiles=profiles)
+    for column, total in ((2, 0.3), (5, 0.7)):
+        np.testing.assert_allclose(found.M[4, column], 2.0 * total, rtol=0.01)
+    assert (found.M[0] == 0).all()
+
+
 def test_what_is_interrupted_goes_on(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
     monkeypatch.setattr(surface_sum, "_PART", 1)  # a part for each workgroup
@@ -319,7 +340,7 @@ def test_anything_that_matters_is_another_entry(gpu: Gpu, monkeypatch: pytest.Mo
         replace(scene, camera=replace(scene.camera, height=201)),
         *(thing(material=replace(SOFT, **change)) for change in ({"color_after": 0.9}, {"roughness": 0.6})),
         thing(material=replace(SOFT, maps=Maps(base_color=np.zeros((1, 1, 3), np.uint8)))),
-        thing(material=replace(SOFT, gaussians=SumOfGaussians(WIDE.variances, 0.99 * WIDE.weights))),
+        thing(material=replace(SOFT, gaussians=SumOfGaussians(1.01 * WIDE.variances, WIDE.weights))),
         thing(translate=(0, 1, 0)),
         thing(motion=None, mesh=shapes.capsule(vertices=600)),
     ]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.cache import KeyPart, cached
-from wgsss.gpu import LIMITS, Gpu
+from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.reference.kernel import Kernel
 
@@ -21,8 +21,9 @@ Array = npt.NDArray[Any]
 _MODULE = "reference/integral"
 _TILE = 1 << 15  # samples of one dispatch: lavapipe ends loops after 65,535 turns, those of nested ones together
 _SUBMISSION = 0.5  # seconds that a dispatch may take
+_GROUPS = 4096  # of receivers in one dispatch, whose lists of blocks stay small
 _FIRST_RATE = 1e7  # pairs of receiver and sample per second that any device manages
-_PART = 1 << 31  # pairs between two entries of the cache, the most that is lost when interrupted
+_PART = 1 << 30  # pairs between two entries of the cache, the most that is lost when interrupted
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +73,11 @@ class _Source:
         self.samples_layout, self.receivers_layout = (
             module.layout(f"array<{name}>") for name in ("Sample", "Receiver")
         )
+        self.count = len(samples.position)
         order = _along_curve(samples.position)
         order = np.append(order, np.repeat(order[-1], -len(order) % self.block))  # whole blocks
         flux = flux[order]
-        flux[len(samples.position) :] = 0.0
+        flux[self.count :] = 0.0
         value = {"position": samples.position[order], "normal": samples.normal[order], "flux": flux}
         packed = self.samples_layout.pack(value)
         digest = hashlib.sha256(packed)
@@ -101,16 +103,16 @@ class _Source:
             low, high = (edge[tile * tile_blocks : (tile + 1) * tile_blocks] for edge in (self.low, self.high))
             first = 0
             while first < groups:
-                most = LIMITS["max-compute-workgroups-per-dimension"]
-                pairs = self.lanes * self.block * np.maximum(len(low), 1)
-                some = int(np.clip(self.rate * _SUBMISSION // pairs, 1, min(groups - first, most, 4096)))
+                pairs = self.lanes * self.block * len(low)
+                some = int(np.clip(self.rate * _SUBMISSION // pairs, 1, min(groups - first, _GROUPS)))
                 chosen = slice(first, first + some)
                 near = _near([b[chosen] for b in bounds], (low, high), self.kernel.reach)
                 found = self._dispatch(buffered, buffer, near, first)
-                sums[0, first * self.lanes : (first + some) * self.lanes] += found["front"]
-                sums[1, first * self.lanes : (first + some) * self.lanes] += found["back"]
+                lanes = slice(first * self.lanes, (first + some) * self.lanes)
+                sums[0, lanes] += found["front"]
+                sums[1, lanes] += found["back"]
                 first += some
-                bar.update(some * self.lanes * len(low) * self.block)
+                bar.update((min(lanes.stop, count) - lanes.start) * min(_TILE, self.count - tile * _TILE))
         return {"front": sums[0, :count], "back": sums[1, :count]}
 
     def _dispatch(self, samples: Any, receivers: Any, near: Array, first: int) -> Array:
