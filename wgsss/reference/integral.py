@@ -37,15 +37,11 @@ _CODE = (
 
 @dataclass(frozen=True)
 class Integral(Reference):
-    """M_front and M_back as sums over samples of the surface; `error` is what the last doubling of density changed."""
+    """M_front and M_back as sums over samples of the surface; `error` is what halving their spacing changed last."""
 
     tolerance: float = field(
         default=TOLERANCE,
-        metadata={
-            "unit": "",
-            "range": (1e-6, 1.0),
-            "help": "change of M, RMS, on halving the spacing at which to stop",
-        },
+        metadata={"unit": "", "range": (1e-6, 1.0), "help": "relative change of M, RMS, by half the spacing"},
     )
     samples: int = field(
         default=SAMPLES, metadata={"unit": "", "range": (1000, 100_000_000), "help": "samples per object, at most"}
