@@ -37,5 +37,3 @@ class Volume(Scaled):
 def lambert(scene: Scene, size: tuple[int, int], time: float = 0.0) -> np.ndarray:
     """M (H, W, 3) of Lambert's method."""
     return Renderer(scene, make_method("lambert"), size).frame(time, ("M_front",), timed=False).aovs["M_front"]
-
-

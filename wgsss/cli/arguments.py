@@ -135,3 +135,11 @@ def assignment(text: str) -> tuple[str, str]:
     if not (name and equals and value):
         raise argparse.ArgumentTypeError(f"'{text}' is not KNOB=VALUE, such as map_size=512")
     return name, value
+
+
+def names(text: str) -> list[str]:
+    """NAME,NAME,…, each once."""
+    found = [name.strip() for name in text.split(",")]
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of names such as lambert,deon07")
+    return list(dict.fromkeys(found))

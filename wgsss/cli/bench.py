@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.cli import arguments
-from wgsss.cli.compare import names
 
 _SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
 _FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
@@ -31,7 +30,7 @@ def declare(commands: Any) -> None:
     parser = arguments.command(commands, "bench", run, "chart speed against accuracy, for all methods over their knobs")
     add = parser.add_argument
     add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
-    add("--methods", metavar="NAME,NAME,…", type=names, help="default: all (see 'wgsss methods')")
+    add("--methods", metavar="NAME,NAME,…", type=arguments.names, help="default: all (see 'wgsss methods')")
     add("--reference", metavar="NAME", default="integral", help="what errors are measured against (default: integral)")
     add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
     add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)

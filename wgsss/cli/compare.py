@@ -15,7 +15,7 @@ def declare(commands: Any) -> None:
     parser = arguments.command(commands, "compare", run, "compare methods with a reference: pictures, errors, costs")
     arguments.add_scene(parser)
     add = parser.add_argument
-    add("--methods", metavar="A,B,…", type=names, help="default: all (see 'wgsss methods')")
+    add("--methods", metavar="A,B,…", type=arguments.names, help="default: all (see 'wgsss methods')")
     add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
     add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
     add("--lights", choices=["all"], help="'all': also under one light of each type, of the same mean irradiance")
@@ -52,13 +52,3 @@ def run(args: Any) -> None:
     if found.lights:
         parts.append(f"by type of light: rel RMSE\n{tables.aligned(tables.by_light(found))}")
     arguments.tell(args, result, "\n\n".join([*parts, str(folder / "report.html")]))
-
-
-def names(text: str) -> list[str]:
-    """NAME,NAME,…, each once."""
-    found = [name.strip() for name in text.split(",")]
-    if not all(found):
-        import argparse
-
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list of names such as lambert,deon07")
-    return list(dict.fromkeys(found))

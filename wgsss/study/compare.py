@@ -113,7 +113,7 @@ def compare(
     truth_by = make_reference(reference) if isinstance(reference, str) else reference
     gpu = default_gpu()
     truth = truth_by.estimate(Stage(gpu, scene, time), size)
-    image = _shown(truth, truth_by, scene, size, time)
+    image = shown(truth, truth_by, scene, size, time)
     seen = image.pixels[..., 3] > 0.0
     runs = []
     for name, method in tqdm(made.items(), desc=scene.name, unit="method", file=sys.stderr, disable=None):
@@ -151,7 +151,7 @@ class _Known(Reference):
         return self.known
 
 
-def _shown(truth: Estimate, by: Reference, scene: Scene, size: tuple[int, int], time: float) -> Image:
+def shown(truth: Estimate, by: Reference, scene: Scene, size: tuple[int, int], time: float) -> Image:
     """The frame that an estimate makes, with its error beside it."""
     image = Renderer(scene, _Known(truth), size).frame(time, _AOVS, timed=False)
     knobs = " ".join(f"{knob}={value}" for knob, value in vars(by).items())

@@ -24,7 +24,8 @@ from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, Scene
-from wgsss.study.compare import footprint, make_reference
+from wgsss.stage import Stage
+from wgsss.study.compare import footprint, make_reference, shown
 from wgsss.study.metrics import errors
 
 Array = npt.NDArray[Any]
@@ -171,9 +172,8 @@ def _truth(scene: Scene, spec: Spec) -> Truth:
     if key not in _last:
         _last.clear()
         method = make_reference(spec.reference)
-        renderer = Renderer(scene, method, spec.size, default_gpu())
-        estimate = method.estimate(renderer.stage, spec.size)
-        image = renderer.frame(timed=False)
+        estimate = method.estimate(Stage(default_gpu(), scene), spec.size)
+        image = shown(estimate, method, scene, spec.size, 0.0)
         _last[key] = Truth(estimate.M, estimate.error, image.display, image.pixels[..., 3] > 0.0)
     return _last[key]
 
