@@ -21,6 +21,7 @@ from PIL import Image as Picture
 
 from wgsss.cli import main
 from wgsss.methods import METHODS
+from wgsss.reference import REFERENCES
 from wgsss.rendering import AOVS, DEFAULT_METHOD
 from wgsss.scene import MATERIALS
 from wgsss.scene.builtin import SCENES
@@ -66,12 +67,20 @@ def test_lists_have_every_name_with_something_to_say_about_it(
     wgsss: Run, command: str, names: dict[str, object]
 ) -> None:
     text = wgsss(command)
-    lines = [line.split(maxsplit=1) for line in text.out.splitlines() if not line.startswith(" ")]
+    said = [line for line in text.out.splitlines() if not line.startswith(" ")]
+    lines = [line.split(maxsplit=1) for line in said if not line.endswith(" (a reference)")]
     assert [line[0] for line in lines] == list(names)
     assert all(len(line) == 2 for line in lines)
     listed = json.loads(wgsss(command, "--json").out)[command]
     assert [entry["name"] for entry in listed] == list(names)
     assert (text.code, text.err) == (0, "")
+
+
+def test_references_are_listed_after_the_methods(wgsss: Run) -> None:
+    text = wgsss("methods").out
+    assert [line.split()[0] for line in text.splitlines() if line.endswith(" (a reference)")] == list(REFERENCES)
+    listed = json.loads(wgsss("methods", "--json").out)["references"]
+    assert [entry["name"] for entry in listed] == list(REFERENCES)
 
 
 def test_methods_list_knobs_with_unit_default_and_range(wgsss: Run) -> None:

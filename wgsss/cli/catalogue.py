@@ -22,18 +22,23 @@ def scenes(args: Any) -> None:
 
 def methods(args: Any) -> None:
     from wgsss.methods import METHODS
+    from wgsss.reference import REFERENCES
 
-    found: list[dict[str, Any]] = [
-        {"name": name, "source": kind.source, "knobs": _knobs(kind)} for name, kind in METHODS.items()
-    ]
+    result = {"methods": _described(METHODS), "references": _described(REFERENCES)}
     rows: list[list[str]] = []
-    for method in found:
-        rows.append([method["name"], method["source"]])
-        for knob in method["knobs"]:
-            low, high = knob["range"]
-            unit = f" {knob['unit']}" if knob["unit"] else ""
-            rows.append(["", f"--set {knob['name']}={knob['default']}  {knob['help']}, {low:g} to {high:g}{unit}"])
-    arguments.tell(args, {"methods": found}, arguments.table(rows))
+    for kind, found in result.items():
+        for entry in found:
+            rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
+            for knob in entry["knobs"]:
+                low, high = knob["range"]
+                unit = f" {knob['unit']}" if knob["unit"] else ""
+                text = f"--set {knob['name']}={knob['default']}  {knob['help']}, {low:g} to {high:.10g}{unit}"
+                rows.append(["", text])
+    arguments.tell(args, result, arguments.table(rows))
+
+
+def _described(kinds: Any) -> list[dict[str, Any]]:
+    return [{"name": name, "source": kind.source, "knobs": _knobs(kind)} for name, kind in kinds.items()]
 
 
 def _knobs(kind: Any) -> list[dict[str, Any]]:

@@ -202,8 +202,11 @@ def _run(name: str, method: Method, scene: Scene, size: tuple[int, int], time: f
 
 def footprint(graph: Graph) -> int:
     """Bytes of textures and buffers that a graph needed as it ran: what persists, and most transients live at once."""
-    persistent = {id(held): held for item in graph.ran for held in item.imports.values()}
-    return graph.peak_bytes + sum(_nbytes(held) for held in persistent.values())
+    persistent: dict[int, Any] = {}
+    for item in graph.ran:
+        indices = getattr(item.state, "indices", None)
+        persistent |= {id(held): held for held in (*item.imports.values(), indices) if held is not None}
+    return graph.peak_bytes + graph.uploaded_bytes + sum(_nbytes(held) for held in persistent.values())
 
 
 def _nbytes(held: Any) -> int:
