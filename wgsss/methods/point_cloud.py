@@ -29,8 +29,10 @@ from wgsss.stage import Body, Stage
 Array = npt.NDArray[Any]
 
 NEAR = 1.5
-"""Within this many spacings of x_o, the profile is blunted to what samples resolve. At a spacing of a mean free path a
-uniformly lit plane is even to 0.1 to 0.4 %, by channel; with 1 to 0.2 to 1.1 %. With more, less of an edge is blurred."""
+"""Within this many spacings of x_o, the profile is blunted to what samples resolve. An evenly lit plane of Skin1, at a
+spacing of a mean free path, is then even to 0.1, 0.2 and 0.4 %; with 1, to 0.2, 0.5 and 1.1 %. With more, shadows stay
+sharp where light should have spread.
+"""
 _ENTRIES = 4096  # of the table of R_d
 _BEYOND = 1e-5  # share of the light that is left out for being far
 
