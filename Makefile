@@ -17,7 +17,7 @@ setup: ## virtual environment, dependencies and, where there is none, a software
 
 demo: setup ## render pictures into out/
 	@mkdir -p out
-	$(BIN)/python examples/side_by_side.py ear lambert deon07 -o out/methods.png
+	$(BIN)/python examples/side_by_side.py ear lambert deon07 jensen02 -o out/methods.png
 	@for scene in $(DEMO); do \
 		(set -x; $(BIN)/wgsss render $$scene -o out/$$scene.png) || exit 1; \
 	done
