@@ -15,8 +15,6 @@ struct Params {
     steps: Number,   // of the table, per factor e of distance
 }
 
-// Turns of one loop that every driver grants.
-const TURNS: u32 = 32768u;
 // Of the length of a normal.
 const ROUNDING: Number = 1e-6;
 
@@ -69,20 +67,19 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     var M = vec3f(0.0);
     var back = vec3f(0.0);
     var k = 0u;
+    // 1,250 turns at an epsilon of 0.3, and more as 1 / epsilon^2; lavapipe ends loops after 65,535.
     while k < arrayLength(&entering) {
-        for (var turns = 0u; turns < TURNS && k < arrayLength(&entering); turns++) {
-            let node = entering[k];
-            let to_node = node.position - x_o;
-            let squared = dot(to_node, to_node);
-            let beyond = params.farthest + node.radius;
-            let stands = squared > node.reach * abs(node.reach) || squared > beyond * beyond; // for all below it
-            let from_node = select(vec3f(0.0), reflectance(squared) * node.flux, stands);
-            M += from_node;
-            back += from_node * select(0.0, facing_away(node.normal, n_o), dot(to_node, n_o) < 0.0);
-            k = select(k + 1u, node.next, stands);
-            if node.next == 0u { // read where nothing is drawn: beside the edges of what is
-                k = arrayLength(&entering);
-            }
+        let node = entering[k];
+        let to_node = node.position - x_o;
+        let squared = dot(to_node, to_node);
+        let beyond = params.farthest + node.radius;
+        let stands = squared > node.reach * abs(node.reach) || squared > beyond * beyond; // for all below it
+        let from_node = select(vec3f(0.0), reflectance(squared) * node.flux, stands);
+        M += from_node;
+        back += from_node * select(0.0, facing_away(node.normal, n_o), dot(to_node, n_o) < 0.0);
+        k = select(k + 1u, node.next, stands);
+        if node.next == 0u { // read where nothing is drawn: beside the edges of what is
+            k = arrayLength(&entering);
         }
     }
     let texel_color = textureLoad(base_color, texel, 0).rgb;

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.octree import Octree, morton, octree
-from wgsss.bake.samples import Samples, subdivided
+from wgsss.bake.samples import Samples, count, subdivided
 from wgsss.errors import InputError
 from wgsss.scene.mesh import Mesh
 
@@ -95,10 +95,8 @@ def _above(corners: Array, x: Array, otherwise: Array) -> Array:
 
 def _parts(mesh: Mesh, spacing: float) -> Samples:
     """Small parts of the mesh's triangles, which are then dealt out to the samples."""
-    corners = mesh.positions[mesh.faces].astype(np.float64)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     width = spacing / _PARTS
-    while (np.ceil(longest / width) ** 2).sum() > max(_MOST_PARTS, 2 * len(longest)):
+    while count(mesh, width) > max(_MOST_PARTS, 2 * len(mesh.faces)):
         width *= 1.2
     return subdivided(mesh, width)
 
@@ -119,10 +117,10 @@ def _spread(x: Array, normal: Array, area: Array, spacing: float) -> tuple[Array
     from scipy.spatial import KDTree
 
     where = np.concatenate([x, 2.0 * spacing * normal], axis=1)
-    count = min(max(round(float(area.sum()) / spacing**2), 1), len(x))
+    sites = min(max(round(float(area.sum()) / spacing**2), 1), len(x))
     along = np.argsort(morton(x), kind="stable")
     reached = np.cumsum(area[along])
-    site = along[np.unique(np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1]))]
+    site = along[np.unique(np.searchsorted(reached, (np.arange(sites) + 0.5) / sites * reached[-1]))]
     for last in [False] * _ROUNDS + [True]:
         cell = KDTree(where[site]).query(where, workers=-1)[1]
         size = np.bincount(cell, area, len(site))

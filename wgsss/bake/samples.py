@@ -31,9 +31,7 @@ def subdivided(mesh: Mesh, spacing: float) -> Samples:
     A triangle is cut n times along each edge into n^2 parts like itself, n as its longest edge wants: the midpoint
     rule, whose areas sum to the mesh's, and whose error falls with the square of the spacing.
     """
-    corners = mesh.positions[mesh.faces].astype(np.float64)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    cuts = np.maximum(np.ceil(longest / spacing), 1).astype(np.int64)
+    cuts = _cuts(mesh, spacing)
     faces, middles, share = [], [], []
     for n in np.unique(cuts):
         cut = np.flatnonzero(cuts == n)
@@ -42,6 +40,23 @@ def subdivided(mesh: Mesh, spacing: float) -> Samples:
         middles.append(np.tile(parts, (len(cut), 1)))
         share.append(np.full(len(cut) * n * n, 1.0 / (n * n)))
     return Samples(np.concatenate(faces).astype(np.int32), np.concatenate(middles), np.concatenate(share))
+
+
+def count(mesh: Mesh, spacing: float) -> int:
+    """How many samples `subdivided` gives."""
+    return int(np.square(_cuts(mesh, spacing)).sum())
+
+
+def longest_edges(mesh: Mesh) -> Array:
+    """The length (F,) of each face's longest edge, mm, float64."""
+    corners = mesh.positions[mesh.faces].astype(np.float64)
+    edges: Array = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return edges
+
+
+def _cuts(mesh: Mesh, spacing: float) -> Array:
+    """Into how many parts (F,) each edge of a face is cut."""
+    return np.maximum(np.ceil(longest_edges(mesh) / spacing), 1).astype(np.int64)
 
 
 def _parts(n: int) -> Array:

@@ -43,7 +43,7 @@ class PointCloud:
 
     epsilon: float = field(
         default=0.3,
-        metadata={"unit": "", "range": (0.05, 2), "help": "largest ratio of a node's size to its distance (eq. 42)"},
+        metadata={"unit": "", "range": (0.1, 2), "help": "largest ratio of a node's size to its distance (eq. 42)"},
     )
     spacing: float = field(
         default=1.0,
@@ -143,7 +143,7 @@ def mean_free_path(material: Material) -> float:
     """
     if material.stack is None:
         return float(np.median(material.profile.range(0.5)))
-    return float(np.median(1.0 / (material.stack[0].sigma_a + material.stack[0].sigma_s_prime)))
+    return float(np.median(material.stack[0].mean_free_path))
 
 
 @dataclass(frozen=True, eq=False)

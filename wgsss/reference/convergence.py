@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.samples import Samples, subdivided
+from wgsss.bake.samples import Samples, count, longest_edges, subdivided
 from wgsss.frame import begin, irradiance_points
 from wgsss.graph import Graph
 from wgsss.optics import Profile
@@ -41,7 +41,7 @@ def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float
         size = np.sqrt(np.square(found.front + found.back).mean(axis=0))
         moved = float((np.sqrt(np.square(found.error).mean(axis=0)) / np.where(size > 0, size, 1.0)).max())
         resolved = _WIDTH * spacing <= width
-        if (enough := moved <= tolerance and resolved) or _count(body.mesh, spacing / 2) > samples:
+        if (enough := moved <= tolerance and resolved) or count(body.mesh, spacing / 2) > samples:
             change = f"still moves by {100 * moved:.2g} % from {last.samples} to {found.samples} samples"
             why = change if resolved else f"is of samples {spacing:.2g} mm apart, too far for the material"
             note = f"{body.material.name} on {body.mesh.name}: M {why}, and no more than {samples} may be taken"
@@ -71,23 +71,11 @@ def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spa
 
 def _first_spacing(mesh: Mesh, widest: float, samples: int) -> float:
     """The spacing, mm, to begin with: `widest`, where that leaves a sample to each face and may be halved."""
-    longest = float(_longest_edges(mesh).max())
+    longest = float(longest_edges(mesh).max())
     spacing = min(longest, widest)
-    while spacing < longest and _count(mesh, spacing / 2) > samples:
+    while spacing < longest and count(mesh, spacing / 2) > samples:
         spacing = min(longest, spacing * 1.1)
     return spacing
-
-
-def _count(mesh: Mesh, spacing: float) -> int:
-    """How many samples at `spacing` mm are."""
-    return int(np.square(np.maximum(np.ceil(_longest_edges(mesh) / spacing), 1)).sum())
-
-
-def _longest_edges(mesh: Mesh) -> Array:
-    """The length (F,) of each face's longest edge, mm."""
-    corners = mesh.positions[mesh.faces].astype(np.float64)
-    edges: Array = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    return edges
 
 
 def irradiance_at(body: Body, places: Samples) -> Array:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.cache import KeyPart, cached
+from wgsss.bake.octree import morton
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.reference.kernel import Kernel
@@ -154,12 +155,5 @@ def _near(a: Any, b: Any, reach: float) -> Array:
 
 
 def _along_curve(positions: Array) -> Array:
-    """An order of positions in which neighbours are near each other: along Morton's curve."""
-    low = positions.min(axis=0)
-    size = max(float((positions.max(axis=0) - low).max()), 1e-30)
-    cell = ((positions - low) * (1023.0 / size)).astype(np.uint32)
-    code = np.zeros(len(cell), np.uint32)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return np.argsort(code, kind="stable")
+    """An order of positions in which neighbours are near each other."""
+    return np.argsort(morton(positions), kind="stable")
