@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wgsss.optics import Profile
+from wgsss.optics import Photons, Profile
 from wgsss.optics.medium import CHANNELS
 from wgsss.output import replacing
 
@@ -61,19 +61,19 @@ def _lines(axis: Axes, found: dict[str, Profile], r: Any, channel: int, weighted
     scale = r if weighted else 1.0
     for number, (name, profile) in enumerate(found.items()):
         R = scale * profile.reflectance(r)[:, channel]
-        if hasattr(profile, "R_error"):
+        if isinstance(profile, Photons):
             _points(axis, name, profile, channel, weighted)
         else:
             width = max(2.8 - 0.5 * number, 1.0)  # thinner ones on top, so that none hides another
             axis.plot(r, R, color=_COLOURS[number % len(_COLOURS)], lw=width, label=name)
         if profile.total_transmittance[channel] > 0.0:
-            colour = _MEASURED if hasattr(profile, "R_error") else _COLOURS[number % len(_COLOURS)]
+            colour = _MEASURED if isinstance(profile, Photons) else _COLOURS[number % len(_COLOURS)]
             axis.plot(r, scale * profile.transmittance(r)[:, channel], "--", color=colour, lw=1.0)
         seen.append(R)
     return seen
 
 
-def _points(axis: Axes, name: str, profile: Any, channel: int, weighted: bool) -> None:
+def _points(axis: Axes, name: str, profile: Photons, channel: int, weighted: bool) -> None:
     """Bins of a measured profile with their standard errors, where these leave something to see."""
     inner, outer = profile.edges[:-1], profile.edges[1:]
     r = np.sqrt(0.5 * (np.square(inner) + np.square(outer)))

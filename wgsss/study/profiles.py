@@ -173,9 +173,8 @@ def described(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
     for error in ("total_error", "total_transmittance_error"):
         if hasattr(profile, error):
             found[error.replace("transmittance", "T")] = getattr(profile, error).tolist()
-    variances = np.broadcast_to(fit.variances.reshape(len(fit.variances), -1), fit.weights.shape)
     found["gaussians"] = {
-        "variances": variances.tolist(),
+        "variances": fit.variances.tolist(),
         "weights": fit.weights.tolist(),
         "error": fit_error(profile, fit).tolist(),
     }

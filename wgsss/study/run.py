@@ -10,25 +10,22 @@ import time
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import wgsss
 from wgsss.bake import cache
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
-from wgsss.rendering import Renderer
+from wgsss.reference import Estimate
+from wgsss.rendering import Image, Renderer
 from wgsss.scene import EnvironmentLight, Scene
 from wgsss.stage import Stage
 from wgsss.study.compare import footprint, make_reference, shown
 from wgsss.study.metrics import errors
-
-Array = npt.NDArray[Any]
 
 FRAMES_S = 2.0
 FEWEST, MOST = 5, 200
@@ -56,18 +53,6 @@ class Spec:
         return " ".join([self.scene, "by", self.method, *(f"{knob}={value}" for knob, value in self.knobs.items())])
 
 
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """What a reference makes of a scene."""
-
-    M: Array
-    """(H, W, 3), W/m^2"""
-    error: Array
-    display: Array
-    seen: Array
-    """bool (H, W)"""
-
-
 def measure(scene: Scene, spec: Spec) -> dict[str, Any]:
     """Do one run.
 
@@ -88,7 +73,7 @@ def measure(scene: Scene, spec: Spec) -> dict[str, Any]:
 
 def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
     gpu = default_gpu()
-    truth = _truth(scene, spec)
+    truth, shown_truth = _truth(scene, spec)
     known = _baked()
     start = time.perf_counter()
     renderer = Renderer(scene, make_method(spec.method, spec.knobs), spec.size, gpu)
@@ -102,9 +87,14 @@ def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
     frames.sort(key=lambda passes: sum(passes.values()))
     totals = [sum(passes.values()) for passes in frames]
     low, middle, high = statistics.quantiles(totals, n=4, method="inclusive")
-    pictures = {"display": image.display, "reference_display": truth.display} if find_spec("flip_evaluator") else {}
-    M = image.aovs["M_front"] + image.aovs["M_back"]
-    found = errors(M, truth.M, truth.seen, error=truth.error, **pictures).json()
+    found = errors(
+        image.aovs["M_front"] + image.aovs["M_back"],
+        truth.M,
+        shown_truth.pixels[..., 3] > 0.0,
+        error=truth.error,
+        display=image.display,
+        reference_display=shown_truth.display,
+    ).json()
     return {
         **spec.json(),
         "adapter": adapter(),
@@ -164,17 +154,17 @@ def digest(scene: Scene) -> str:
     return found.hexdigest()[:16]
 
 
-_last: dict[Any, Truth] = {}  # of the last scene only: runs come scene by scene
+_last: dict[Any, tuple[Estimate, Image]] = {}  # of the last scene only: runs come scene by scene
 
 
-def _truth(scene: Scene, spec: Spec) -> Truth:
+def _truth(scene: Scene, spec: Spec) -> tuple[Estimate, Image]:
+    """What the reference makes of a scene."""
     key = (spec.digest, spec.size, spec.reference)
     if key not in _last:
         _last.clear()
         method = make_reference(spec.reference)
         estimate = method.estimate(Stage(default_gpu(), scene), spec.size)
-        image = shown(estimate, method, scene, spec.size, 0.0)
-        _last[key] = Truth(estimate.M, estimate.error, image.display, image.pixels[..., 3] > 0.0)
+        _last[key] = estimate, shown(estimate, method, scene, spec.size, 0.0)
     return _last[key]
 
 
