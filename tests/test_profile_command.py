@@ -13,6 +13,7 @@ import pytest
 from wgsss.cli import main
 from wgsss.optics import Dipole, Tabulated
 from wgsss.scene import MATERIALS, load_material
+from wgsss.study.profiles import MODELS
 
 SKIN1 = MATERIALS["skin1"]
 
@@ -65,6 +66,13 @@ def test_a_material_with_layers(tmp_path: Path, capsys):
     path.write_text(layer + layer)
     _, err = run(capsys, str(path), code=2)
     assert "material 'two': layer 1 has no end" in err
+
+
+def test_help_names_every_model(capsys):
+    with pytest.raises(SystemExit):
+        main(["profile", "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert all(name in said for name in MODELS)
 
 
 def test_plot(tmp_path: Path, capsys):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import MATTE, lit, plane, write_environment
+from scenes import MATTE, WHITE, lit, plane, write_environment
 
 from wgsss.bake.sky import sky_visibility
 from wgsss.gpu import Gpu
@@ -73,6 +73,20 @@ def test_irradiance_of_the_sky_beside_a_ball(gpu: Gpu) -> None:
         d2 = np.square(x) + 12.0**2
         wanted = np.pi * (1 - 25.0 / d2 * 12.0 / np.sqrt(d2))
         np.testing.assert_allclose(image.aovs["irradiance"][20, [34, 37, 40], 1], wanted, rtol=0.01)
+
+
+def test_the_skys_reflection_is_hidden_likewise(gpu: Gpu) -> None:
+    """By the same share: what the ball's form factor leaves of it."""
+    ground = plane(side=60.0, cells=60)
+    both = [
+        Renderer(lit(SKY, mesh=ground, material=WHITE, extra=extra), make_method("lambert"), (41, 41), gpu)
+        .frame(aovs=["specular"])
+        .aovs["specular"][20, [34, 37, 40], 1]
+        for extra in ((Object(ball(12.0), MATTE),), ())
+    ]
+    d2 = np.square((np.array([34, 37, 40]) + 0.5) / 41 * 20 - 10) + 12.0**2
+    assert both[1].min() > 0.0
+    np.testing.assert_allclose(both[0] / both[1], 1 - 25.0 / d2 * 12.0 / np.sqrt(d2), rtol=0.01)
 
 
 def test_objects_of_one_mesh_have_their_own_skies(gpu: Gpu) -> None:
