@@ -90,7 +90,6 @@ class Material:
         if self.layers is not None:
             object.__setattr__(self, "layers", stack(self.layers))
             object.__setattr__(self, "eta", self.layers[0].eta)
-            _ = self.profile  # refuses what diffusion cannot do
         elif self.gaussians is None and self.table is None:
             if self.sigma_a is None or self.sigma_s_prime is None:
                 missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
@@ -110,13 +109,19 @@ class Material:
 
     @cached_property
     def profile(self) -> Profile:
-        """The diffusion profile R(r), 1/mm^2 per channel: the dipole's, where the medium is homogeneous."""
+        """The diffusion profile R(r), 1/mm^2 per channel: the dipole's, where the medium is homogeneous.
+
+        Raises InputError for layers too thin for diffusion, through which photons can still be followed.
+        """
         if self.gaussians is not None:
             return self.gaussians
         if self.table is not None:
             return self.table
         if self.layers is not None:
-            return Layers(self.layers)
+            try:
+                return Layers(self.layers)
+            except InputError as error:
+                raise InputError(f"material '{self.name}': {error}") from None
         assert self.sigma_a is not None and self.sigma_s_prime is not None
         return Dipole(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta)
 
