@@ -40,11 +40,12 @@ def fresnel(mu, eta):
     return 0.5 * (s**2 + t**2)
 
 
-def half_space(albedo: float, boundary=lambda mu: 0 * mu, critical: float = 0.5) -> float:
+def half_space(albedo: float, boundary=lambda mu: 0 * mu, critical: float = 0.5, sky: bool = False) -> float:
     """Reflectance of a half space that scatters isotropically, under a boundary that reflects `boundary(mu)` inside.
 
     By Chandrasekhar's H: of a beam in at `nu`, albedo / 2 H(mu) H(nu) mu / (mu + nu) leaves per mu, and what the
-    boundary reflects of it comes in again. `critical` is a cosine at which the boundary is not smooth.
+    boundary reflects of it comes in again. `critical` is a cosine at which the boundary is not smooth. An even sky
+    is as bright below the boundary, but for what that reflects.
     """
     x, w = np.polynomial.legendre.leggauss(100)
     x, w = 0.5 * (x + 1), 0.5 * w
@@ -56,7 +57,9 @@ def half_space(albedo: float, boundary=lambda mu: 0 * mu, critical: float = 0.5)
         H = 0.5 * (H + 1 / (np.sqrt(1 - albedo) + kernel @ H))
     leaving = 0.5 * albedo * (H * mu)[:, None] * H / (mu[:, None] + mu)
     reflected = boundary(mu)
-    total = np.linalg.solve(np.eye(len(mu)) - leaving * (reflected * w), leaving[:, -1])
+    entering = mu * (1 - reflected) * w if sky else np.eye(len(mu))[-1]
+    first = leaving @ entering / entering.sum()
+    total = np.linalg.solve(np.eye(len(mu)) - leaving * (reflected * w), first)
     return float(np.sum((1 - reflected) * total * w))
 
 
@@ -66,11 +69,11 @@ def test_slab_of_van_de_hulst(slab):
     within(slab.total_transmittance, slab.total_transmittance_error, 0.66096, least=5e-6)
 
 
-@pytest.mark.parametrize(("eta", "of_incident"), [(1.3, None), (1.5, 0.2600)])
-def test_half_space_of_giovanelli(gpu, eta, of_incident):
+@pytest.mark.parametrize(("eta", "sky", "of_incident"), [(1.3, False, None), (1.5, True, None), (1.5, False, 0.2600)])
+def test_half_space_of_giovanelli(gpu, eta, sky, of_incident):
     """Wang, Jacques and Zheng 1995, table 2: 0.2600 with what the surface reflects at once; and to more digits."""
-    photons = trace([Layer((1, 1, 1), (9, 9, 9), eta)], 200_000, gpu=gpu)
-    exact = half_space(0.9, lambda mu: fresnel(mu, eta), np.sqrt(1 - eta**-2))
+    photons = trace([Layer((1, 1, 1), (9, 9, 9), eta)], 200_000, sky=sky, gpu=gpu)
+    exact = half_space(0.9, lambda mu: fresnel(mu, eta), np.sqrt(1 - eta**-2), sky)
     within(photons.total, photons.total_error, exact)
     if of_incident:
         specular = photons.specular
@@ -130,8 +133,10 @@ def test_refraction_sets_where_light_leaves(gpu):
 def test_half_spaces_of_chandrasekhar(gpu, albedo):
     """The last two are clear enough for leaps."""
     sigma_t = np.array([1.0, 2.0, 5.0])
-    photons = trace([Layer(sigma_t * (1 - np.array(albedo)), sigma_t * albedo, 1.0)], 100_000, gpu=gpu)
-    within(photons.total, photons.total_error, [half_space(a) for a in albedo])
+    layer = Layer(sigma_t * (1 - np.array(albedo)), sigma_t * albedo, 1.0)
+    for sky in (False, True):
+        photons = trace([layer], 100_000, sky=sky, gpu=gpu)
+        within(photons.total, photons.total_error, [half_space(a, sky=sky) for a in albedo])
 
 
 def test_light_far_away_where_nothing_absorbs(gpu):
@@ -211,7 +216,13 @@ def test_clear_layers_absorb_by_beer_and_reflect_by_fresnel(gpu):
 
 @pytest.mark.parametrize(("eta", "specular"), [(1.0, 0.0), (1.3, 0.0170), (1.5, 0.04)])
 def test_specular_reflection(gpu, eta, specular):
-    assert trace([Layer((9, 9, 9), (1, 1, 1), eta)], 1, gpu=gpu).specular == pytest.approx(specular, abs=5e-5)
+    layer = Layer((9, 9, 9), (1, 1, 1), eta)
+    assert trace([layer], 1, gpu=gpu).specular == pytest.approx(specular, abs=5e-5)
+    cosine, w = np.polynomial.legendre.leggauss(64)
+    cosine = 0.5 * (cosine + 1)
+    below = np.sqrt(1 - (1 - cosine**2) / eta**2)
+    of_sky = np.sum(w * cosine * fresnel(below, eta))
+    assert trace([layer], 1, sky=True, gpu=gpu).specular == pytest.approx(of_sky, abs=2e-3)
 
 
 def test_energy_closes(slab, skin):

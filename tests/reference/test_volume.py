@@ -441,16 +441,16 @@ def test_slab_of_photons(gpu):
 
 @needs_mitsuba
 @pytest.mark.parametrize(
-    ("light", "most"), [(EnvironmentLight((1, 1, 1)), 0.13), (DirectionalLight((-1, 0, 0), (1, 1, 1)), 0.2)]
+    ("light", "most"), [(EnvironmentLight((1, 1, 1)), 0.1), (DirectionalLight((-1, 0, 0), (1, 1, 1)), 0.2)]
 )
 def test_ball_by_the_profile_of_photons(gpu, light, most):
-    """On a ball of milk, ten mean free paths in radius, the profile of a half space errs by 11 % under a sky and by
-    19 % under a beam from the side, RMS, besides the noise."""
+    """On a ball of milk, ten mean free paths in radius, the profile of a half space errs by 8 % under a sky and by
+    18 % under a beam from the side, RMS, besides the noise."""
     milk = replace(material("wholemilk"), eta=1.0)
     radius = 10 / (3.21 + 0.0024)
     camera = OrthographicCamera((0, 0, 9 * radius), (0, 0, 0), height=2.05 * radius)
     stage = Stage(gpu, ball(light, medium=milk, camera=camera, mesh=shapes.sphere(radius, 2000)))
-    photons = trace(milk.stack, 30_000, gpu=gpu)
+    photons = trace(milk.stack, 30_000, sky=True, gpu=gpu)
     truth = Volume(samples=256).estimate(stage, (12, 12))
     profile = integral(stage, (12, 12), profiles={0: photons})
     seen = truth.M.max(axis=2) > 0

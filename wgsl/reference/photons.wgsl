@@ -1,4 +1,5 @@
-// Photons through a stack of plane layers, from a beam that has entered its top at a right angle.
+// Photons through a stack of plane layers, from a beam that has entered its top at a right angle, or from a sky that
+// shines on a point of it evenly.
 //
 // The method of Wang, Jacques and Zheng 1995 (MCML): flights of random length, a share of the weight absorbed at each
 // scattering, Henyey and Greenstein's phase function, reflection or refraction by chance where indices differ, roulette.
@@ -11,6 +12,7 @@
 // do from one dispatch to the next, so that none takes long. A photon's random numbers follow from its own number and
 // tallies are integers, so that the result does not depend on which lane took which photon, or when.
 
+import package::fresnel::{fresnel_dielectric};
 import package::units::{Length, Number, PI};
 import package::random::{random_words, random_numbers};
 
@@ -25,6 +27,7 @@ const DEEP: Number = 24.0;      // transport mean free paths from the boundaries
 const MARGIN: Number = 8.0;     // that a leap keeps from them
 
 override LEAPS: u32 = 0u;       // 1 where there is a layer to leap in
+override SKY: u32 = 0u;         // 1 where light comes from everywhere above
 
 struct Layer {
     sigma_t: Number,    // 1/mm
@@ -49,7 +52,7 @@ struct Params {
 struct Photon {
     p: vec3f,         // mm; z is the depth below the top of the layer
     weight: Number,   // 0 once it has ended
-    w: vec3f,         // direction
+    w: vec3f,         // direction; 0 before it has entered
     stock: Number,    // weight and what was absorbed of it: 1, but for roulette
     number: u32,
     flight: u32,
@@ -84,6 +87,16 @@ fn scattered(w: vec3f, cosine: Number, turn: Number) -> vec3f {
     return u * (1.5 - 0.5 * dot(u, u)); // rounding must not add up over thousands of scatterings
 }
 
+// The direction in which a photon from an even sky enters: 0 where the top reflects it, and the next is to be tried.
+fn entering(eta: Number, u: vec4f) -> vec3f {
+    let outside = sqrt(u.x); // cosine
+    if u.y < fresnel_dielectric(outside, eta) {
+        return vec3f(0.0);
+    }
+    let sine = sqrt(max(1.0 - u.x, 0.0)) / eta;
+    return vec3f(sine * cos(2.0 * PI * u.z), sine * sin(2.0 * PI * u.z), sqrt(1.0 - sine * sine));
+}
+
 @compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let last = arrayLength(&layers) - 1u;
@@ -92,7 +105,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
     for (var turn = 0u; turn < AT_ONCE; turn++) {
         if photon.weight == 0.0 {
-            photon = Photon(vec3f(0.0), 1.0, vec3f(0.0, 0.0, 1.0), 1.0, params.first + atomicAdd(&work.taken, 1u), 0u, 0u);
+            photon = Photon(vec3f(0.0), 1.0, vec3f(0.0, 0.0, f32(1u - SKY)), 1.0, params.first + atomicAdd(&work.taken, 1u), 0u, 0u);
             more = photon.number < params.end;
         }
         if !more {
@@ -103,6 +116,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let words = random_words(vec4u(photon.number, photon.flight, params.key));
         let u = random_numbers(words);
         photon.flight++;
+        if all(photon.w == vec3f(0.0)) {
+            photon.w = entering(here.above, u);
+            continue;
+        }
 
         let down = photon.w.z > 0.0;
         let cosine = abs(photon.w.z);

@@ -14,6 +14,7 @@ from wgsss.errors import InputError
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.optics import Layer, Photons
+from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.medium import check_index, stack
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ def trace(
     *,
     seed: int = 0,
     eta_below: float = 1.0,
+    sky: bool = False,
     gpu: Gpu | None = None,
     label: str = "",
 ) -> Photons:
@@ -45,6 +47,7 @@ def trace(
         photons: to follow in each channel.
         seed: at least 0; another one gives other random numbers.
         eta_below: refractive index of what lies below the last layer. Above the first one is air.
+        sky: light comes evenly from everywhere above, not at a right angle. Obliquely, less of it reaches deep.
         gpu: where to run; by default the device that the commands share.
         label: of the progress bar, which shows on a terminal only.
 
@@ -62,7 +65,7 @@ def trace(
     shortest = 1.0 / max(layer.sigma_t_prime.max() for layer in layers)
     innermost = int(np.float32((_NEAREST * shortest) ** 2).view(np.uint32) >> 20)
     with tqdm(total=3 * photons, desc=label, unit=" photons", unit_scale=True, file=sys.stderr, disable=None) as bar:
-        tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, bar)
+        tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, sky, bar)
         keys = [np.random.SeedSequence([seed, channel]).generate_state(2) for channel in range(3)]
         counts = [tracer.follow(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]
     share = np.stack([count.share for count in counts], axis=-1)
@@ -86,7 +89,7 @@ def trace(
         total_error=error[-2],
         total_transmittance_error=error[-1],
         absorbed=share[2 * rings],
-        specular=((eta - 1.0) / (eta + 1.0)) ** 2,
+        specular=diffuse_fresnel(1.0 / eta) if sky else ((eta - 1.0) / (eta + 1.0)) ** 2,
         photons=int(photons),
     )
 
@@ -144,8 +147,8 @@ class _Count:
 class _Tracer:
     """Follows one channel's photons after another's."""
 
-    def __init__(self, gpu: Gpu, photons: int, innermost: int, bar: Any) -> None:
-        self.gpu, self.photons, self.innermost, self.bar = gpu, photons, innermost, bar
+    def __init__(self, gpu: Gpu, photons: int, innermost: int, sky: bool, bar: Any) -> None:
+        self.gpu, self.photons, self.innermost, self.sky, self.bar = gpu, photons, innermost, sky, bar
         self.batch = min(_BATCH, -(-photons // _BATCHES))
         module = wgsl.load(_MODULE)
         self.rings, self.slots = module.constants["RINGS"], module.constants["TALLIES"]
@@ -168,7 +171,7 @@ class _Tracer:
     def _round(self, batches: int, photons: int, **bindings: Any) -> Array:
         """Tallies (batches, slots) of photons of full weight."""
         work, tallies = self.gpu.buffer(self.idle), self.gpu.buffer(bytes(4 * batches * self.slots))
-        constants = {"LEAPS": any(layer["transport"] < _ENDLESS for layer in bindings["layers"])}
+        constants = {"LEAPS": any(layer["transport"] < _ENDLESS for layer in bindings["layers"]), "SKY": self.sky}
         ended, on_their_way = 0, photons
         while on_their_way:
             graph = Graph(self.gpu)

@@ -102,6 +102,9 @@ def split(steps: list[Array], seen: Array) -> Causes:
 def photon_profiles(scene: Scene) -> dict[int, Profile]:
     """The profile of each object's material, by the object's index, as PHOTONS photons tell it.
 
+    They enter from everywhere, as L_d does not tell from where: on balls, even under a beam, that is nearer to volume
+    than a right angle (examples/spheres.py).
+
     Raises InputError where a material is known by its profile only.
     """
     from wgsss.reference.photons import trace
@@ -112,7 +115,7 @@ def photon_profiles(scene: Scene) -> dict[int, Profile]:
         if material.stack is None:
             raise InputError(f"material '{material.name}' is known by its profile only, which has no volume")
         if id(material) not in traced:
-            traced[id(material)] = trace(material.stack, PHOTONS, label=f"photons in {material.name}")
+            traced[id(material)] = trace(material.stack, PHOTONS, sky=True, label=f"photons in {material.name}")
     return {index: traced[id(item.material)] for index, item in enumerate(scene.objects)}
 
 
