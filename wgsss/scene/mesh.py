@@ -8,13 +8,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.material import Maps
+
+if TYPE_CHECKING:
+    from wgsss.scene.animation import Animation
 
 Array = npt.NDArray[Any]
 
@@ -118,17 +121,22 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class LoadedMesh:
-    """What a mesh file holds: the surface, and the textures of its material."""
+    """What a mesh file holds: the surface, the textures of its material, and how it moves."""
 
     mesh: Mesh
     maps: Maps = field(default_factory=Maps)
+    motion: Animation | None = None
 
 
-def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: float | None = None) -> LoadedMesh:
+def load_mesh(
+    path: str | Path, *, mm_per_unit: float | None = None, size_mm: float | None = None, animation: str | None = None
+) -> LoadedMesh:
     """Read a triangle mesh from a .ply, .obj, .stl, .off, .glb or .gltf file.
 
     `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
-    others. `size_mm` scales the longest side of the bounding box to a length, whatever the unit.
+    others. `size_mm` scales the longest side of the bounding box, at rest, to a length, whatever the unit.
+    `animation` is the name of the glTF animation that becomes the motion, or its number where it has none: without it
+    the first one, and none where it is "none".
 
     Several parts, placed by the file's scene graph, become one mesh. Textures (base colour, normal, specular) are kept
     where all parts share them; constant colours of the file's materials are not. Normals are kept where they are not
@@ -136,8 +144,10 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
     counted, all of it told in one warning.
 
     Raises InputError, naming the file, where it is missing, not what its ending says, empty, without an area, or holds
-    positions that are not finite, and for a scale that is not positive.
+    positions that are not finite, for a skin, morph targets or an animation that do not fit it, and for a scale that is
+    not positive.
     """
+    from wgsss.scene.animation import Animation, animate
     from wgsss.scene.meshfile import MM_PER_UNIT, read_triangles
     from wgsss.scene.repair import counted, repair
 
@@ -145,7 +155,7 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
     for name, value in (("mm_per_unit", mm_per_unit), ("size_mm", size_mm)):
         if value is not None and not (isinstance(value, Real) and 0 < value < math.inf):
             raise InputError(f"{path}: {name} must be a number above 0, not {value!r}")
-    file = read_triangles(path)
+    file, clip = animate(path, read_triangles(path), animation)
     bad = int((~np.isfinite(file.positions)).any(axis=1).sum())
     if bad:
         raise InputError(f"{path}: {bad} of {len(file.positions)} positions are not finite numbers")
@@ -170,7 +180,8 @@ def load_mesh(path: str | Path, *, mm_per_unit: float | None = None, size_mm: fl
     mesh = Mesh(fixed.positions, fixed.faces, corner_uvs=corner_uvs, name=path.stem)
     if file.normals is not None and not fixed.flipped.any():
         mesh = replace(mesh, corner_normals=_own_normals(mesh, fixed.corners(file.normals[file.faces])))
-    return LoadedMesh(mesh, file.maps)
+    motion = None if clip is None else Animation(clip, clip.first[fixed.sources(file.faces)], scale)
+    return LoadedMesh(mesh, file.maps, motion)
 
 
 def _own_normals(mesh: Mesh, normals: Array) -> Array | None:

@@ -45,6 +45,8 @@ class Triangles:
     """whether vertices may be repeated for a reason: seams, hard edges, several parts, a format without indices"""
     notes: tuple[str, ...]
     """what was left out"""
+    parts: tuple[tuple[Array, Array], ...]
+    """positions (V, 3) before they were placed, and placement (4, 4), of the parts that follow one another above"""
 
 
 def read_triangles(path: Path) -> Triangles:
@@ -96,6 +98,7 @@ def read_triangles(path: Path) -> Triangles:
         maps,
         splits=has_normals or bool(with_uvs) or len(parts) > 1 or path.suffix.lower() == ".stl",
         notes=tuple(notes),
+        parts=tuple((np.asarray(mesh.vertices, np.float64), matrix) for mesh, matrix in parts),
     )
 
 

@@ -38,6 +38,12 @@ class Repaired:
         values = values[self.kept]
         return np.where(self.flipped[:, None, None], values[:, ::-1], values)
 
+    def sources(self, faces: Array) -> Array:
+        """For each position the index (V,) of one that went in, the faces that went in being (N, 3)."""
+        found = np.empty(len(self.positions), np.int64)
+        found[self.faces] = self.corners(faces[..., None])[..., 0]
+        return found
+
 
 def weld(positions: Array) -> tuple[Array, Array]:
     """Equal rows of float32 (V, 3) made one: those left, in order of appearance, and for each row its new index."""

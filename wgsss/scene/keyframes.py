@@ -1,0 +1,105 @@
+"""The channels of a glTF animation: keys over time, and what lies between them (glTF 2.0, appendix C)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.gltf import Document
+from wgsss.scene.rig import Pose
+
+Array = npt.NDArray[Any]
+
+PATHS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+# Rows of values per key: a cubic spline has the tangent that leads to it, the value and the tangent that leads away.
+INTERPOLATIONS = {"LINEAR": 1, "STEP": 1, "CUBICSPLINE": 3}
+# Beyond this cosine of the angle between two rotations the sine by which slerp divides is lost to rounding.
+PARALLEL = 1 - 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One property of one node, over time."""
+
+    node: int
+    path: str
+    """a key of PATHS"""
+    interpolation: str
+    """a key of INTERPOLATIONS"""
+    times: Array
+    """float64 (K,), s, from 0 up, never falling"""
+    values: Array
+    """float64 (K, 1, C), or of a cubic spline (K, 3, C)"""
+
+    def at(self, time_s: float) -> Array:
+        """float64 (C,): the value at a time; before the first and after the last key, theirs."""
+        value = self.values[:, len(self.values[0]) // 2]
+        last = int(np.searchsorted(self.times, time_s, side="right")) - 1
+        if last < 0 or last == len(self.times) - 1 or self.interpolation == "STEP":
+            return value[max(last, 0)]
+        step = self.times[last + 1] - self.times[last]
+        t = (time_s - self.times[last]) / step
+        start, end = value[last], value[last + 1]
+        if self.interpolation == "CUBICSPLINE":
+            leaving, arriving = step * self.values[last, 2], step * self.values[last + 1, 0]
+            return (
+                (2 * t**3 - 3 * t**2 + 1) * start
+                + (t**3 - 2 * t**2 + t) * leaving
+                + (3 * t**2 - 2 * t**3) * end
+                + (t**3 - t**2) * arriving
+            )
+        return _slerp(start, end, t) if self.path == "rotation" else (1 - t) * start + t * end
+
+    def put(self, pose: Pose, time_s: float) -> None:
+        """Write the value at a time into a pose."""
+        value = self.at(time_s)
+        if self.path == "rotation" and not np.linalg.norm(value) > 1e-12:
+            return  # a spline through zero: there the rotation is none in particular
+        getattr(pose, self.path)[self.node][:] = value
+
+
+def _slerp(start: Array, end: Array, t: float) -> Array:
+    """Between two quaternions, the shorter way round."""
+    start, end = start / np.linalg.norm(start), end / np.linalg.norm(end)
+    cosine = float(start @ end)
+    if cosine < 0:
+        end, cosine = -end, -cosine
+    if cosine > PARALLEL:
+        between: Array = (1 - t) * start + t * end
+        return between
+    angle = math.acos(cosine)
+    turned: Array = (math.sin((1 - t) * angle) * start + math.sin(t * angle) * end) / math.sin(angle)
+    return turned
+
+
+def read_channels(document: Document, animation: Any, rest: Pose, where: str) -> list[Channel]:
+    """The channels of an animation, a pygltflib one; those of extensions left out. Raises InputError for bad ones."""
+    found = []
+    for number, channel in enumerate(animation.channels):
+        node, path, what = channel.target.node, channel.target.path, f"{where}, channel {number}"
+        if node is None or path not in PATHS:
+            continue
+        if not 0 <= node < len(rest.weights):
+            raise InputError(f"{what}: there is no node {node}")
+        if not 0 <= channel.sampler < len(animation.samplers):
+            raise InputError(f"{what}: there is no sampler {channel.sampler}")
+        sampler = animation.samplers[channel.sampler]
+        kind = sampler.interpolation or "LINEAR"
+        if kind not in INTERPOLATIONS:
+            raise InputError(f"{what}: interpolation must be one of {', '.join(INTERPOLATIONS)}, not {kind}")
+        times = document.numbers(sampler.input, "SCALAR", f"{what}: times")[:, 0].astype(np.float64)
+        if not len(times) or times[0] < 0 or (np.diff(times) < 0).any():
+            raise InputError(f"{what}: its times must rise, from 0 or later")
+        size = len(rest.weights[node]) if path == "weights" else getattr(rest, path).shape[1]
+        rows = len(times) * INTERPOLATIONS[kind] * (size if path == "weights" else 1)
+        values = document.numbers(sampler.output, PATHS[path], f"{what}: {path}", rows).astype(np.float64)
+        values = values.reshape(len(times), INTERPOLATIONS[kind], size)
+        if path == "rotation" and not values[:, INTERPOLATIONS[kind] // 2].any(axis=1).all():
+            raise InputError(f"{what}: a rotation is zero")
+        found.append(Channel(node, path, kind, times, values))
+    return found
