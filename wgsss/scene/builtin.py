@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from wgsss.errors import InputError
 from wgsss.scene import shapes
 from wgsss.scene.camera import PerspectiveCamera
@@ -97,8 +95,7 @@ def wave(vertices: int | None = None) -> Scene:
     finger = Object(shapes.capsule(vertices=vertices), WAX, motion=BendAndSwell())
     lamp = SphereLight((90, 70, -120), 15, radiance=(170, 165, 155))
     key = DirectionalLight(direction=(0.5, -0.5, -0.7), irradiance=(1.4, 1.45, 1.5))
-    poses = [finger.at(time_s) for time_s in np.linspace(0, BendAndSwell().period_s, 9)]
-    return Scene("wave", (finger,), (lamp, key), _framed(poses, azimuth=0, elevation=8))
+    return Scene("wave", (finger,), (lamp, key), _framed([finger], azimuth=0, elevation=8))
 
 
 def crowd(vertices: int | None = None, copies: int = 4) -> Scene:

@@ -20,17 +20,18 @@ DEFAULT_LIGHTS: tuple[Light, ...] = (
     DirectionalLight((-0.4, -0.3, 1.0), (1.6, 1.6, 1.6)),
     EnvironmentLight((0.1, 0.1, 0.1)),
 )
+POSES = 9  # of a moving object, which the camera is to have in view
 _MARGIN = 1.08  # of the width of the image, over what the objects fill
 
 
 def framing(
     objects: Iterable[Object], *, azimuth: float = 20.0, elevation: float = 10.0, fov: float = 30.0
 ) -> PerspectiveCamera:
-    """A camera with all objects in a square image, with a small margin; angles in degrees.
+    """A camera with all objects in a square image, with a small margin, wherever they move to; angles in degrees.
 
     By default nearly from the front, but a little to the right and above: no symmetric thing looks flat.
     """
-    points = np.concatenate([o.placed for o in objects])
+    points = np.concatenate([pose.placed for thing in objects for pose in _poses(thing)])
     camera = PerspectiveCamera.orbit((0, 0, 0), 1.0, azimuth, elevation, fov=fov)
     turn = camera.view()[:3, :3]
     right, up, towards = turn @ points.T
@@ -43,3 +44,10 @@ def framing(
     # The point looked at, about which a turning camera goes, lies at the middle of the object's depth.
     target = target + turn[2] * (towards.max() + towards.min()) / 2
     return replace(camera, eye=tuple(eye.tolist()), target=tuple(target.tolist()))
+
+
+def _poses(thing: Object) -> list[Object]:
+    """An object as it is at times spread over its motion."""
+    if thing.motion is None:
+        return [thing]
+    return [thing.at(time_s) for time_s in np.linspace(0, thing.motion.period_s, POSES)]

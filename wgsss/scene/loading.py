@@ -43,7 +43,7 @@ def load_scene(
     if is_mesh:
         loaded = load_mesh(path, size_mm=size_mm)
         chosen = chosen or choose_material(DEFAULT_MATERIAL, Path())
-        thing = Object(loaded.mesh, chosen.on(loaded.maps))
+        thing = Object(loaded.mesh, chosen.on(loaded.maps), motion=loaded.motion)
         return Scene(path.stem, (thing,), DEFAULT_LIGHTS, framing([thing]))
     scene: Scene = SCENES[name](vertices) if builtin else read_scene(path)
     if chosen is None:

@@ -24,7 +24,11 @@ TONE_MAPS = ("none", "reinhard", "aces")
 
 
 class Motion(Protocol):
-    """How an object's shape changes over time."""
+    """How an object's shape changes over time, over and over."""
+
+    @property
+    def period_s(self) -> float:
+        """Seconds after which it begins anew."""
 
     def apply(self, positions: Array, time_s: float) -> Array:
         """Positions (V, 3) in mm, in the object's own space, as they are at a time in seconds."""

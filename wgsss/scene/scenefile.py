@@ -2,11 +2,11 @@
 
 The top level holds `name`, `exposure` and `tone_map`. `[camera]`, each `[[light]]` and each `[[object]]` hold the
 fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and `elevation`
-of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm`) or a `shape` (with the arguments of that
-function in `shapes`), and a `material`: a name, a material file, or a table `[object.material]`. Such a table or file
-holds the fields of Material, may start from a `preset`, and names images as `base_color_map`, `normal_map` and
-`specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake case. Paths are relative to the file
-they stand in. What is left out has the defaults of a mesh file.
+of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm` and the `animation` of a glTF) or a `shape`
+(with the arguments of that function in `shapes`), and a `material`: a name, a material file, or a table
+`[object.material]`. Such a table or file holds the fields of Material, may start from a `preset`, and names images as
+`base_color_map`, `normal_map` and `specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake
+case. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 from wgsss.errors import InputError
 from wgsss.scene import tables
+from wgsss.scene.animation import NONE
 from wgsss.scene.camera import OrthographicCamera, PerspectiveCamera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
@@ -65,14 +66,16 @@ def _object(table: Table, where: str, folder: Path) -> Object:
     own = [key for key in inspect.signature(Object).parameters if key != "mesh"]
     tables.check_keys(table, ["mesh", "shape", *own, *options], where)
 
-    arguments, maps = {key: table[key] for key in options if key in table}, Maps()
+    arguments, maps, motion = {key: table[key] for key in options if key in table}, Maps(), None
     if "mesh" in table:
         arguments["path"] = tables.file_in(table, "mesh", where, folder)
+        if "motion" in table and arguments.setdefault("animation", NONE) != NONE:
+            raise InputError(f"{where}: give either motion or the animation of the mesh")
     mesh = tables.call(source, arguments, where)
     if "mesh" in table:
-        mesh, maps = mesh.mesh, mesh.maps
+        mesh, maps, motion = mesh.mesh, mesh.maps, mesh.motion
 
-    values = {key: table[key] for key in own if key in table}
+    values = {"motion": motion, **{key: table[key] for key in own if key in table}}
     try:
         chosen = choose_material(table.get("material", DEFAULT_MATERIAL), folder, f"{where}: [object.material]")
     except InputError as error:
