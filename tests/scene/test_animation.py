@@ -204,6 +204,21 @@ def test_seams_stay_closed_though_their_vertices_are_carried_differently(tmp_pat
     assert at(loaded, 1) == pytest.approx(loaded.mesh.positions, abs=1e-6)
 
 
+def test_two_skins_move_one_mesh_in_two_places(tmp_path: Path) -> None:
+    """Where it was modelled both are the same, and one would be dropped as a double."""
+    file = arm()
+    upper = file.node(root=False, translation=[0, 1, 0])
+    lower = file.node(children=[upper], translation=[30, 0, 0])
+    file.tree.skins.append(g.Skin(joints=[lower, upper], inverseBindMatrices=file.tree.skins[0].inverseBindMatrices))
+    file.node(mesh=0, skin=1, translation=[7, 0, 0])
+    loaded = load(file, tmp_path / "arms.glb")
+    rest = loaded.mesh.positions
+    left = rest[:, 0] < 15
+    assert len(rest) == 24 and left.sum() == 12
+    assert at(loaded, 1)[left] == pytest.approx(bent(rest[left], math.pi / 2), abs=1e-6)
+    assert at(loaded, 1)[~left] == pytest.approx(rest[~left])
+
+
 def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_path: Path) -> None:
     file = arm()
     share = np.zeros((12, 4))
@@ -369,6 +384,15 @@ def test_the_first_animation_or_the_one_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"box\.ply: it has no animations, so none named 'Walk'$"):
         load_mesh(tmp_path / "box.ply", animation="Walk")
     assert load_mesh(tmp_path / "box.ply", animation="none").motion is None
+
+
+def test_a_single_key_is_a_pose(tmp_path: Path) -> None:
+    file = arm()
+    file.tree.animations.clear()
+    file.animate((2, "rotation", (0,), (ABOUT_Z,)))
+    loaded = load(file, tmp_path / "arm.glb")
+    for time_s in (0, 1):
+        assert at(loaded, time_s) == pytest.approx(bent(loaded.mesh.positions, math.pi / 2), abs=1e-6)
 
 
 def test_an_animation_that_moves_nothing_of_the_mesh_is_none(tmp_path: Path) -> None:
@@ -568,6 +592,14 @@ def test_a_transform_that_is_not_finite(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("2.5", "NaN"))
     with pytest.raises(InputError, match=r"arm\.gltf: node 2: scale must be 3 finite numbers$"):
         load_mesh(path)
+
+
+def test_a_mesh_that_vanishes_for_a_while(tmp_path: Path) -> None:
+    file = arm()
+    file.animate((1, "scale", (0, 1, 2), ((1, 1, 1), (0, 0, 0), (1, 1, 1))), name="Blink")
+    file.tree.animations.reverse()
+    with pytest.raises(InputError, match=r"arm: a size of 0 mm is out of range .*, 1 s into its motion$"):
+        load_scene(file.save(tmp_path / "arm.glb"))
 
 
 def test_a_mesh_of_other_vertices_is_refused(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ class Clip:
     channels: tuple[Channel, ...]
     """at least one"""
     first: Array
-    """int (V,): for each vertex the first one of those at the same place where the mesh was modelled"""
+    """int (V,): for each vertex the first one at the same place of the mesh as it was modelled"""
 
     def positions(self, time_s: float) -> Array:
         """float64 (V, 3): all vertices of the file, in its units, at a time from 0 to the last key."""
@@ -82,9 +82,7 @@ def animate(path: Path, file: Triangles, name: str | None) -> tuple[Triangles, C
         document = read_document(path)
         rig, bare = read_rig(document, file.parts)
         name, channels = _choose(document, rig, name)
-    # What is one point of the surface where it was modelled stays one: neither rounding nor weights open a seam.
-    welded = weld(file.positions.astype(np.float32))[1]
-    first = np.unique(welded, return_index=True)[1][welded]
+    first = _first_of_equal(rig)
     file = _at_rest(file, rig, first)
     if bare:
         note = f"{counted(bare, 'vertex')} without joint weights carried by the skin's first joint"
@@ -106,6 +104,21 @@ def _choose(document: Document, rig: Rig, name: str | None) -> tuple[str, tuple[
     movers, morphed = rig.movers(), {part.node for part in rig.parts}
     channels = read_channels(document, animations[name], rig.nodes.rest, f"animation {name}")
     return name, tuple(c for c in channels if c.node in (morphed if c.path == "weights" else movers))
+
+
+def _first_of_equal(rig: Rig) -> Array:
+    """int (V,): for each vertex the first one of its node that is at the same place.
+
+    What is one point of the surface where it was modelled stays one: neither rounding nor weights open a seam.
+    """
+    nodes = np.repeat([part.node for part in rig.parts], [len(part.positions) for part in rig.parts])
+    modelled = np.concatenate([part.positions for part in rig.parts]).astype(np.float32)
+    first = np.arange(len(nodes))
+    for node in np.unique(nodes):
+        own = np.flatnonzero(nodes == node)
+        welded = weld(modelled[own])[1]
+        first[own] = own[np.unique(welded, return_index=True)[1][welded]]
+    return first
 
 
 def _at_rest(file: Triangles, rig: Rig, first: Array) -> Triangles:

@@ -71,10 +71,13 @@ class Object:
         return world
 
     def at(self, time_s: float) -> Object:
-        """The object as it is at a time in seconds, no longer moving."""
+        """The object as it is at a time in seconds, no longer moving. Raises InputError where that is no shape."""
         if self.motion is None:
             return self
-        moved = self.mesh.deformed(self.motion.apply(self.mesh.positions, time_s))
+        try:
+            moved = self.mesh.deformed(self.motion.apply(self.mesh.positions, time_s))
+        except InputError as error:
+            raise InputError(f"{error}, {time_s:g} s into its motion") from None
         return replace(self, mesh=moved, motion=None)
 
 
