@@ -204,6 +204,25 @@ def test_seams_stay_closed_though_their_vertices_are_carried_differently(tmp_pat
     assert at(loaded, 1) == pytest.approx(loaded.mesh.positions, abs=1e-6)
 
 
+def test_weights_count_by_their_share_and_joints_without_any_not_at_all(tmp_path: Path) -> None:
+    file = arm()
+    attributes = primitive(file).attributes
+    attributes.JOINTS_0 = file.add(np.tile((0, 1, 200, 0), (12, 1)), "VEC4", "u1")
+    attributes.WEIGHTS_0 = file.add(np.repeat([(3, 0, 0, 0), (3, 3, 0, 0), (0, 3, 0, 0)], 4, axis=0), "VEC4")
+    loaded = load(file, tmp_path / "arm.glb")
+    assert at(loaded, 1) == pytest.approx(bent(loaded.mesh.positions, math.pi / 2), abs=1e-6)
+
+
+def test_normals_are_those_of_the_posed_surface(tmp_path: Path) -> None:
+    """The file's hard edges are of another pose than that at rest."""
+    file = arm()
+    outwards = bar()[0] * (1, 0, 1)
+    primitive(file).attributes.NORMAL = file.add(outwards / np.linalg.norm(outwards, axis=1, keepdims=True), "VEC3")
+    file.tree.nodes[2].rotation = list(ABOUT_Z)
+    mesh = load(file, tmp_path / "arm.glb", animation="none").mesh
+    assert mesh.corner_normals is None
+
+
 def test_two_skins_move_one_mesh_in_two_places(tmp_path: Path) -> None:
     """Where it was modelled both are the same, and one would be dropped as a double."""
     file = arm()
@@ -301,6 +320,20 @@ def test_parts_move_with_their_nodes(tmp_path: Path) -> None:
     assert moved[high] == pytest.approx(np.stack([-(y - 20), 20 + 3 * x, z], axis=1), abs=1e-5)
 
 
+def test_meshes_of_the_same_place_are_told_apart(tmp_path: Path) -> None:
+    """The one is wound inwards, and turned over as it is read."""
+    file, (small, faces), (large, _) = File(), box(), box((5, 0, 0), (9, 4, 4))
+    file.node(mesh=file.mesh(small, faces[:, ::-1]))
+    file.node(mesh=file.mesh(large, faces))
+    moved = ((0, 0, 0), (0, 0, 8), (0, 0, 0))
+    file.animate((1, "translation", (0, 1, 2), moved), (0, "scale", (0, 1, 2), ((1, 1, 1), (1, 1, 5), (1, 1, 1))))
+    with pytest.warns(UserWarning, match="12 faces wound inwards, turned over"):
+        loaded = load_mesh(file.save(tmp_path / "boxes.glb"), mm_per_unit=1)
+    rest = loaded.mesh.positions
+    expected = np.where(rest[:, :1] < 5, rest * (1, 1, 5), rest + np.array((0, 0, 8)))
+    assert at(loaded, 1) == pytest.approx(expected)
+
+
 # --- between keys ----------------------------------------------------------------------------------------------------
 
 
@@ -319,12 +352,12 @@ def test_between_two_keys(kind: str, expected: dict[float, float]) -> None:
 
 
 def test_a_cubic_spline_goes_through_a_cubic() -> None:
-    times = (0.0, 2.0, 3.0)
-    values = [((9 if t == 0 else 3 * t**2), t**3, (3 * t**2 if t < 3 else 9)) for t in times]  # 9: nobody looks there
+    times = (1, 3, 4)
+    values = [((9 if t == 1 else 3 * t**2), t**3, (3 * t**2 if t < 4 else 9)) for t in times]  # 9: nobody looks there
     found = channel("weights", "CUBICSPLINE", times, values)
-    for time_s in (0, 0.5, 1.5, 2, 2.25, 3):
+    for time_s in (1, 1.5, 2.5, 3, 3.25, 4):
         assert found.at(time_s)[0] == pytest.approx(time_s**3)
-    assert found.at(7) == 27
+    assert (found.at(0)[0], found.at(7)[0]) == (1, 64)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -550,6 +583,10 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "falling times": (
         lambda f: setattr(sampler(f), "input", f.add((0, 2, 1), "SCALAR")),
+        "animation Bend, channel 0: its times must rise, from 0 or later",
+    ),
+    "times before the start": (
+        lambda f: setattr(sampler(f), "input", f.add((-1, 0, 1), "SCALAR")),
         "animation Bend, channel 0: its times must rise, from 0 or later",
     ),
     "no such node": (
