@@ -125,7 +125,7 @@ def test_without_standing_nodes_it_is_the_sum_over_the_samples(gpu, shape):
         scene = lit(SIDE, mesh=ear(2000), material=SKIN, camera=replace(FRONT, height=60))
         found = Passes(gpu, scene, PointCloud(epsilon=EXACT, spacing=2.0))
     front, back = brute_force(found)
-    assert rms(found.M - front - back) < 2e-4 * rms(front)
+    assert rms(found.M - front - back) < 6e-4 * rms(front), "the table's entries have 9 bits"
     assert rms(found.M_back - back) < 2e-3 * rms(back), "normals have 11 bits"
 
 

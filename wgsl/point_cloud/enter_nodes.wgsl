@@ -1,10 +1,11 @@
 // What the nodes of one height in the octree stand for, from their children.
 
 import package::point_cloud::tree::{Node, Entering, brightness, farthest};
-import package::units::{Number};
+import package::units::{Number, Length};
 
 struct Params {
-    epsilon: Number, // of Mikkelsen 2009, eq. 42
+    epsilon: Number,  // of Mikkelsen 2009, eq. 42
+    farthest: Length, // beyond which no light arrives
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -33,7 +34,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let weight = select(1.0, brightness(flux), lit);
     let position = node.centre + moment / weight;
     let radius = farthest(node, position);
-    // A node that x_o lies in is never small enough.
-    let reach = max(sqrt(node.area) / params.epsilon, radius);
-    entering[k] = Entering(position, reach, flux, node.next, normal / weight, radius);
+    // A node that x_o lies in is never small enough, and one that no light arrives from always is.
+    let reach = min(max(sqrt(node.area) / params.epsilon, radius), params.farthest + radius);
+    entering[k] = Entering(position, reach, flux, node.next, normal / weight);
 }

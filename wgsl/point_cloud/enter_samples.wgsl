@@ -17,5 +17,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let node = nodes[k];
     let flux = irradiance[node.first].rgb * node.area;
     // The reach of a node that is no sample is set from those below it.
-    entering[k] = Entering(points[node.first].position, -1.0, flux, node.next, points[node.first].normal, 0.0);
+    entering[k] = Entering(points[node.first].position, -1.0, flux, node.next, points[node.first].normal);
 }

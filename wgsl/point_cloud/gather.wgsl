@@ -1,22 +1,29 @@
 // M from an octree of samples (Jensen & Buhler 2002; Mikkelsen 2009, 3.2), split by where light enters (Maisch &
 // Ropinski 2017, eq. 13, 14).
+//
+// Neighbouring pixels need nearly the same nodes, so that a block of them walks the octree together (Barnes 1990): a
+// node stands for those below it where it is small enough for the nearest pixel. What is read for a node, which takes
+// longer than what is done with it, is read once for all.
 
 import package::mesh::{Surface, color_before, color_after};
 import package::point_cloud::tree::{Entering};
-import package::screen::{screen_corner, position_of_pixel};
-import package::targets::{RGBA32Float};
-import package::units::{Number, Length, Position, Direction};
+import package::screen::{position_of_pixel};
+import package::units::{Number, Position, Direction};
 
 struct Params {
     clip_to_world: mat4x4f,
-    near: vec3f,     // share of L_d at x_o itself: what the samples stand too far apart for
-    nearest: Length, // of the table's first entry
-    farthest: Length, // of its last, 0
-    steps: Number,   // of the table, per factor e of distance
+    near: vec3f,       // share of L_d at x_o itself: what the samples stand too far apart for
+    unit: Number,      // of the table, 1/mm^2
+    first_entry: u32,  // of the table, as the leading bits of the squared distance
+    first_object: u32, // 1 where nothing has been written yet: what it is not seen at is set to 0
 }
 
 // Of the length of a normal.
 const ROUNDING: Number = 1e-6;
+const SHIFT: u32 = 15u;      // bits of a squared distance between entries of the table: 256 for each time it doubles
+const TILE: u32 = 32u;       // pixels of a workgroup, a side
+const BLOCK: u32 = 4u;       // of an invocation
+const NOWHERE: Number = 1e9; // mm: too far for light to get there
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> surface: Surface;
@@ -25,65 +32,154 @@ const ROUNDING: Number = 1e-6;
 @group(0) @binding(4) var base_color: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
 @group(0) @binding(6) var irradiance: texture_2d<f32>;
-@group(0) @binding(7) var<storage, read> table: array<vec4f>; // R_d over the logarithm of the distance; 0 beyond
+@group(0) @binding(7) var<storage, read> table: array<u32>; // R_d over the squared distance; 0 in the last
 @group(0) @binding(8) var<storage, read> entering: array<Entering>;
+@group(0) @binding(9) var M_front: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(10) var M_back: texture_storage_2d<rgba32float, write>;
 
-struct Pixel {
-    @location(0) M_front: RGBA32Float,
-    @location(1) M_back: RGBA32Float,
+// x_o and n_o at two by two pixels, a component of the vectors for each: what is done for one takes no longer for four.
+struct Four {
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+    n_x: vec4f,
+    n_y: vec4f,
+    n_z: vec4f,
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+// At the four, a column each.
+struct Sums {
+    M: mat4x3f,
+    back: mat4x3f, // of which from behind
 }
 
-// R_d at the root of `squared`, by the nearest entry: they are a fraction of a percent apart.
-fn reflectance(squared: f32) -> vec3f {
-    let at = 0.5 * log(squared / (params.nearest * params.nearest)) * params.steps;
-    let last = arrayLength(&table) - 1u;
-    return table[min(u32(max(at + 0.5, 0.0)), last)].rgb;
+fn is_seen(texel: vec2u) -> bool {
+    return all(texel < textureDimensions(where_seen)) && u32(textureLoad(where_seen, texel, 0).z) == surface.id;
 }
 
-// The share of a node whose normals, of this mean, turn away from n_o: as if their cosines were spread evenly about
-// theirs. All or nothing for a sample, and nothing at a right angle.
-fn facing_away(mean: vec3f, n_o: Direction) -> Number {
-    let varied = max(1.0 - dot(mean, mean) - ROUNDING, 0.0);
-    let spread = sqrt(1.5 * varied); // of even cosines whose variance is a half of that
-    return clamp(0.5 * (spread - dot(mean, n_o) - ROUNDING) / max(spread, 1e-10), 0.0, 1.0);
+fn corner_of(i: u32) -> vec2u {
+    return vec2u(i & 1u, i >> 1u);
 }
 
-@fragment
-fn fs(@builtin(position) pixel: vec4f) -> Pixel {
-    let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
-        discard;
-    }
-    let seen = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+// The four pixels from `first` on. Where the object is not seen, x_o is nowhere.
+fn four(first: vec2u) -> Four {
     let to_world = mat3x3f(surface.object_to_world[0].xyz, surface.object_to_world[1].xyz, surface.object_to_world[2].xyz);
-    let x_o = (seen - surface.object_to_world[3].xyz) * to_world;
-    let n_o = normalize(textureLoad(normal, texel, 0).xyz) * to_world;
-
-    var M = vec3f(0.0);
-    var back = vec3f(0.0);
-    var k = 0u;
-    // 1,250 turns at an epsilon of 0.3, and more as 1 / epsilon^2; lavapipe ends loops after 65,535.
-    while k < arrayLength(&entering) {
-        let node = entering[k];
-        let to_node = node.position - x_o;
-        let squared = dot(to_node, to_node);
-        let beyond = params.farthest + node.radius;
-        let stands = squared > node.reach * abs(node.reach) || squared > beyond * beyond; // for all below it
-        let from_node = select(vec3f(0.0), reflectance(squared) * node.flux, stands);
-        M += from_node;
-        back += from_node * select(0.0, facing_away(node.normal, n_o), dot(to_node, n_o) < 0.0);
-        k = select(k + 1u, node.next, stands);
-        if node.next == 0u { // read where nothing is drawn: beside the edges of what is
-            k = arrayLength(&entering);
+    let size = vec2f(textureDimensions(depth));
+    var x: array<Position, 4>;
+    var n: array<Direction, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        let texel = first + corner_of(i);
+        x[i] = vec3f(NOWHERE);
+        if is_seen(texel) {
+            let at = position_of_pixel(vec2f(texel) + 0.5, textureLoad(depth, texel, 0), size, params.clip_to_world);
+            x[i] = (at - surface.object_to_world[3].xyz) * to_world;
+            n[i] = normalize(textureLoad(normal, texel, 0).xyz) * to_world;
         }
     }
-    let texel_color = textureLoad(base_color, texel, 0).rgb;
-    let at_x_o = params.near * color_before(surface, texel_color) * textureLoad(irradiance, texel, 0).rgb;
-    let after = color_after(surface, texel_color);
-    return Pixel(vec4f((at_x_o + M - back) * after, 1.0), vec4f(back * after, 1.0));
+    let across = transpose(mat4x3f(x[0], x[1], x[2], x[3]));
+    let turned = transpose(mat4x3f(n[0], n[1], n[2], n[3]));
+    return Four(across[0], across[1], across[2], turned[0], turned[1], turned[2]);
+}
+
+// From a node to the four, squared.
+fn distances(node: Entering, at: Four) -> vec4f {
+    let x = node.position.x - at.x;
+    let y = node.position.y - at.y;
+    let z = node.position.z - at.z;
+    return x * x + y * y + z * z;
+}
+
+fn least(values: vec4f) -> f32 {
+    return min(min(values.x, values.y), min(values.z, values.w));
+}
+
+// An entry of the table: three mantissas of 9 bits that share an exponent.
+fn unpacked(entry: u32) -> vec3f {
+    let bits = table[entry];
+    return vec3f((vec3u(bits) >> vec3u(0u, 9u, 18u)) & vec3u(511u)) * bitcast<f32>(((bits >> 27u) + 87u) << 23u);
+}
+
+// R_d at the roots of `squared`, in the table's unit.
+fn reflectances(squared: vec4f) -> mat4x3f {
+    let wanted = max(bitcast<vec4u>(squared) >> vec4u(SHIFT), vec4u(params.first_entry)) - params.first_entry;
+    let entry = min(wanted, vec4u(arrayLength(&table) - 1u));
+    return mat4x3f(unpacked(entry.x), unpacked(entry.y), unpacked(entry.z), unpacked(entry.w));
+}
+
+// The share of a node whose normals, of this mean, turn away from n_o, where it lies below the horizon of x_o: as if
+// their cosines were spread evenly about the mean's. All or nothing for a sample, and nothing at a right angle.
+fn behind(node: Entering, at: Four) -> vec4f {
+    let varied = max(1.0 - dot(node.normal, node.normal) - ROUNDING, 0.0);
+    let spread = sqrt(1.5 * varied); // of even cosines whose variance is a half of that
+    let scale = 0.5 / max(spread, 1e-10);
+    let cosine = node.normal.x * at.n_x + node.normal.y * at.n_y + node.normal.z * at.n_z;
+    let away = clamp(scale * (spread - ROUNDING - cosine), vec4f(0.0), vec4f(1.0));
+    let above = (node.position.x - at.x) * at.n_x + (node.position.y - at.y) * at.n_y + (node.position.z - at.z) * at.n_z;
+    return select(vec4f(0.0), away, above < vec4f(0.0));
+}
+
+// `sums` and what arrives from a node, `flux` having entered there.
+fn added(sums: Sums, node: Entering, flux: vec3f, at: Four, squared: vec4f) -> Sums {
+    let R = reflectances(squared);
+    let M = mat4x3f(flux * R[0], flux * R[1], flux * R[2], flux * R[3]);
+    let share = behind(node, at);
+    return Sums(sums.M + M, sums.back + mat4x3f(share.x * M[0], share.y * M[1], share.z * M[2], share.w * M[3]));
+}
+
+fn store(first: vec2u, from_nodes: Sums) {
+    var sums = from_nodes;
+    for (var i = 0u; i < 4u; i++) {
+        let texel = first + corner_of(i);
+        let color = textureLoad(base_color, texel, 0).rgb;
+        let M = params.unit * sums.M[i] + params.near * color_before(surface, color) * textureLoad(irradiance, texel, 0).rgb;
+        let back = params.unit * sums.back[i];
+        let after = color_after(surface, color);
+        if is_seen(texel) {
+            textureStore(M_front, texel, vec4f((M - back) * after, 1.0));
+            textureStore(M_back, texel, vec4f(back * after, 1.0));
+        } else if params.first_object == 1u {
+            textureStore(M_front, texel, vec4f(0.0));
+            textureStore(M_back, texel, vec4f(0.0));
+        }
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) i: u32) {
+    // Invocations that follow each other walk in step, eight of them on lavapipe: they are kept near each other.
+    let block = vec2u((i & 3u) | (i >> 1u & 4u), (i >> 2u & 1u) | (i >> 3u & 6u));
+    let first = TILE * tile.xy + BLOCK * block;
+    let second = first + vec2u(2u, 0u);
+    let third = first + vec2u(0u, 2u);
+    let fourth = first + vec2u(2u, 2u);
+    let a = four(first);
+    let b = four(second);
+    let c = four(third);
+    let d = four(fourth);
+    let nothing = Sums(mat4x3f(), mat4x3f());
+    var from_a = nothing;
+    var from_b = nothing;
+    var from_c = nothing;
+    var from_d = nothing;
+    let end = arrayLength(&entering);
+    let is_empty = least(min(min(a.x, b.x), min(c.x, d.x))) == NOWHERE;
+    // 1,600 turns at an epsilon of 0.3, and more as 1 / epsilon^2; lavapipe ends loops after 65,535.
+    for (var k = select(0u, end, is_empty); k < end;) {
+        let node = entering[k];
+        let to_a = distances(node, a);
+        let to_b = distances(node, b);
+        let to_c = distances(node, c);
+        let to_d = distances(node, d);
+        let stands = least(min(min(to_a, to_b), min(to_c, to_d))) > node.reach * abs(node.reach); // for all below it
+        let flux = select(vec3f(0.0), node.flux, stands);
+        from_a = added(from_a, node, flux, a, to_a);
+        from_b = added(from_b, node, flux, b, to_b);
+        from_c = added(from_c, node, flux, c, to_c);
+        from_d = added(from_d, node, flux, d, to_d);
+        k = select(k + 1u, node.next, stands);
+    }
+    store(first, from_a);
+    store(second, from_b);
+    store(third, from_c);
+    store(fourth, from_d);
 }

@@ -20,7 +20,6 @@ struct Entering {
     flux: vec3f,        // Phi_k, W/m^2 mm^2
     next: u32,
     normal: vec3f,      // the mean, the shorter the more the samples' differ
-    radius: Length,     // of the sphere around P_k that holds its box
 }
 
 // By which P_k is weighted: the colours share one.

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from wgsss import frame as shared
 from wgsss import wgsl
-from wgsss.bake.octree import Octree
+from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.point_cloud import PointCloud as Cloud
 from wgsss.bake.point_cloud import point_cloud
 from wgsss.frame import Frame
@@ -28,12 +28,15 @@ from wgsss.stage import Body, Stage
 
 Array = npt.NDArray[Any]
 
+_GATHER = "point_cloud/gather"
 NEAR = 1.5
 """Within this many spacings of x_o, the profile is blunted to what samples resolve. An evenly lit plane of Skin1, at a
 spacing of a mean free path, is then even to 0.1, 0.2 and 0.4 %; with 1, to 0.2, 0.5 and 1.1 %. With more, shadows stay
 sharp where light should have spread.
 """
-_ENTRIES = 4096  # of the table of R_d
+_CLOSEST = 0.02  # of that distance: closer, R_d is level
+_MANTISSA, _EXPONENT = 9, 5  # bits of the table's entries
+_PROBES = np.geomspace(1e-3, 1e2, 64)  # mm: where profiles are compared
 _BEYOND = 1e-5  # share of the light that is left out for being far
 
 
@@ -78,33 +81,41 @@ class PointCloud:
 
     def passes(self, frame: Frame) -> Diffused:
         irradiance = shared.irradiance_pixels(frame)
-        M: Any = {}
+        tile = wgsl.load(_GATHER).constants["TILE"]
+        M: dict[str, Any] = {
+            name: frame.graph.texture(name, (*frame.size, 1), "rgba32float") for name in ("M_front", "M_back")
+        }
         for body in frame.stage.bodies:
-            posed, kernel = self._posed(body), self.kernel(body)
-            drawn = frame.graph.draw(
-                "point_cloud/gather",
-                into=M,
-                size=frame.size,
+            kernel = self.kernel(body)
+            gathered = frame.graph.dispatch(
+                _GATHER,
+                size=(64 * -(-frame.size[0] // tile), -(-frame.size[1] // tile)),
                 params={
                     "clip_to_world": frame.view.clip_to_world,
                     "near": kernel.near,
-                    "nearest": kernel.r[0],
-                    "farthest": kernel.r[-1],
-                    "steps": (len(kernel.r) - 1) / np.log(kernel.r[-1] / kernel.r[0]),
+                    "unit": kernel.unit,
+                    "first_entry": kernel.first,
+                    "first_object": body.index == 0,
                 },
                 surface=body.surface,
                 irradiance=irradiance,
-                table=np.pad(kernel.R, ((0, 0), (0, 1))),
-                entering=self._entering(frame, body, posed),
+                table=self._table(body),
+                entering=self._entering(frame, body),
+                **M,
                 **frame.seen("where_seen", "normal", "base_color", "depth"),
             )
-            M = vars(drawn)
+            M = vars(gathered)
         return Diffused(M["M_front"], M["M_back"], irradiance)
 
-    def _entering(self, frame: Frame, body: Body, posed: Posed) -> Handle:
+    def _table(self, body: Body) -> Any:
+        kernel = self.kernel(body)
+        return body.stage.shared(("table", id(kernel)), lambda: body.stage.gpu.buffer(kernel.packed))
+
+    def _entering(self, frame: Frame, body: Body) -> Handle:
         """What the nodes of a body's octree stand for, from the samples up."""
-        graph, tree = frame.graph, posed.tree
-        irradiance = shared.irradiance_points(frame, body, posed.points, int(tree.count[0]))
+        graph, posed, cloud = frame.graph, self._posed(body), self.cloud(body)
+        tree, params = cloud.tree, {"epsilon": self.epsilon, "farthest": self.kernel(body).r[-1]}
+        irradiance = shared.irradiance_points(frame, body, posed.points, len(cloud.samples.face))
         entering = graph.dispatch(
             "point_cloud/enter_samples",
             size=len(tree.first),
@@ -112,18 +123,27 @@ class PointCloud:
             irradiance=irradiance,
             nodes=posed.nodes,
         )
-        for height in range(1, int(tree.height.max()) + 1):
-            chosen = np.flatnonzero(tree.height == height).astype(np.uint32)
+        for height, (count, chosen) in enumerate(self._heights(body), start=1):
             entering = graph.dispatch(
                 "point_cloud/enter_nodes",
-                size=len(chosen),
+                size=count,
                 label=f"height {height}",
-                params={"epsilon": self.epsilon},
+                params=params,
                 nodes=posed.nodes,
                 chosen=chosen,
                 entering=entering,
             )
         return entering
+
+    def _heights(self, body: Body) -> list[tuple[int, Any]]:
+        """How many nodes there are of each height from 1 on, and a buffer of which they are."""
+        cloud, gpu = self.cloud(body), body.stage.gpu
+
+        def make() -> list[tuple[int, Any]]:
+            chosen = [nodes.astype(np.uint32) for nodes, _, _ in cloud.tree.levels()][1:]
+            return [(len(nodes), gpu.buffer(nodes)) for nodes in chosen]
+
+        return body.stage.shared(("heights", id(cloud)), make)
 
     def _posed(self, body: Body) -> Posed:
         """A body's samples as posed, on the device. Of a moving one only the last pose is kept."""
@@ -151,17 +171,54 @@ class Kernel:
     """A profile without what samples cannot resolve."""
 
     r: Array
-    """float64 (n,), mm, equally spaced in the logarithm"""
+    """float64 (n,), mm, each in the middle of the squared distances whose leading bits are the same"""
     R: Array
     """float64 (n, 3), 1/mm^2; as at the first entry before it, 0 from the last"""
     near: Array
     """float64 (3,), the rest: what is missing to the profile's total"""
 
+    @property
+    def first(self) -> int:
+        """The leading bits of the first entry's squared distance."""
+        return int(_leading(self.r[:1])[0])
+
+    @property
+    def unit(self) -> float:
+        """1/mm^2: more than any R, of which one step is a share of 2^-9 or less."""
+        return float(2.0 ** np.ceil(np.log2(max(self.R.max(), 1e-30) * 1.01)))
+
+    @property
+    def packed(self) -> Array:
+        """uint32 (n,): R in `unit`, three mantissas that share an exponent. What an R is off by is a share of 1/512 of
+        the largest channel's, and no two distances' alike."""
+        R = self.R / self.unit
+        most, steps = 2**_EXPONENT - 1, 2**_MANTISSA
+        # One less than all bits of a mantissa, so that rounding cannot reach the next exponent.
+        exponent = np.ceil(np.log2(np.maximum(R.max(axis=1), 1e-30) * steps / (steps - 1)))
+        shared = np.clip(exponent + most, 0, most)
+        mantissa = np.rint(R * 2.0 ** (most + _MANTISSA - shared[:, None])).astype(np.uint32)
+        places = np.arange(3, dtype=np.uint32) * _MANTISSA
+        packed: Array = np.bitwise_or.reduce(mantissa << places, axis=1) | shared.astype(np.uint32) << 3 * _MANTISSA
+        return packed
+
 
 def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
-    """R_d to `size` mm, within `blunt` mm replaced by R_d((r^2 + blunt^2) / (2 blunt)), which is flat in the middle."""
+    """R_d to `size` mm, within `blunt` mm replaced by R_d((r^2 + blunt^2) / (2 blunt)), which is flat in the middle;
+    cached."""
+
+    def make() -> Arrays:
+        return vars(_kernel(profile, blunt, size))
+
+    key: list[KeyPart] = [profile.total, profile.reflectance(_PROBES), blunt, size]
+    return Kernel(**cached("point-cloud-kernel", key, make, code=[type(profile), _GATHER]))
+
+
+def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     far = max(min(size, float(profile.range(_BEYOND).max())), 2.0 * blunt)
-    r = np.geomspace(0.02 * blunt, far, _ENTRIES)
+    first, last = _leading(np.array([_CLOSEST * blunt, far]))
+    bits = np.arange(first, last + 2, dtype=np.uint32) << np.uint32(_shift())
+    edges = bits.view(np.float32).astype(np.float64)
+    r = np.sqrt(0.5 * (edges[:-1] + edges[1:]))
 
     def blunted(r: Array) -> Array:
         return profile.reflectance(np.where(r < blunt, (np.square(r) + blunt**2) / (2.0 * blunt), r))
@@ -174,11 +231,19 @@ def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     return Kernel(r, R, profile.total * profile.enclosed(blunt) - kept)
 
 
+def _shift() -> int:
+    return wgsl.load(_GATHER).constants["SHIFT"]
+
+
+def _leading(r: Array) -> Array:
+    """The leading bits of squared distances, by which the table is looked up."""
+    return np.square(r).astype(np.float32).view(np.uint32) >> np.uint32(_shift())
+
+
 @dataclass(frozen=True, eq=False)
 class Posed:
     """A point cloud at one time on the device, in object space."""
 
-    tree: Octree
     points: Any
     """buffer of array<Vertex>: the samples"""
     nodes: Any
@@ -200,4 +265,4 @@ def posed(body: Body, cloud: Cloud) -> Posed:
         "first": tree.first,
     }
     layout = wgsl.load("point_cloud/tree").layout("array<Node>")
-    return Posed(tree, body.points(cloud.samples), body.stage.gpu.buffer(layout.pack(nodes)))
+    return Posed(body.points(cloud.samples), body.stage.gpu.buffer(layout.pack(nodes)))
