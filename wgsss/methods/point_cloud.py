@@ -69,8 +69,10 @@ class PointCloud:
 
     def cloud(self, body: Body) -> Cloud:
         """The samples of a body's mesh at rest."""
-        mesh, spacing = body.rest.mesh, self.spacing * mean_free_path(body.material)
-        return body.stage.shared(("point cloud", id(mesh), spacing), lambda: point_cloud(mesh, spacing))
+        mesh, material, stage = body.rest.mesh, body.material, body.stage
+        path = stage.shared(("mean free path", id(material)), lambda: mean_free_path(material))  # takes milliseconds
+        spacing = self.spacing * path
+        return stage.shared(("point cloud", id(mesh), spacing), lambda: point_cloud(mesh, spacing))
 
     def kernel(self, body: Body) -> Kernel:
         """The profile of a body's material as its samples see it."""
