@@ -259,6 +259,35 @@ def test_kernel_and_pixel_share_the_total():
     assert (np.diff(found.R, axis=0) <= 0).all() and (found.near > 0).all()
 
 
+def test_the_packed_table_is_within_a_step_of_nine_bits():
+    found = kernel(MATERIALS["skin1"].profile, 0.3, 100.0)
+    mantissa = found.packed[:, None] >> np.uint32([0, 9, 18]) & np.uint32(511)
+    R = found.unit * mantissa * 2.0 ** ((found.packed >> 27).astype(float) - 40)[:, None]
+    step = np.maximum(found.R.max(axis=1, keepdims=True) / 256, found.unit * 2.0**-40)
+    assert (np.abs(R - found.R) <= 0.51 * step).all()
+    np.testing.assert_array_equal(found.packed[-1] & np.uint32(2**27 - 1), 0)
+
+
+def test_a_kernel_comes_from_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
+    first = kernel(SKIN.profile, 0.3, 100.0)
+    monkeypatch.setattr("wgsss.methods.point_cloud._kernel", None)
+    second = kernel(SKIN.profile, 0.3, 100.0)
+    np.testing.assert_array_equal(first.packed, second.packed)
+
+
+def test_where_nothing_is_seen_there_is_nothing(gpu):
+    """The textures that it writes may hold what an earlier frame left there."""
+    light = DirectionalLight((0, 0, -1), (1, 1, 1))
+    for height in (4, 18):  # first the sphere fills the image, then not
+        camera = replace(FRONT, height=height)
+        scene = lit(light, mesh=sphere(5.0, 500), material=SKIN, camera=camera)
+        image = Renderer(scene, PointCloud(spacing=3.0), (50, 39), gpu).frame(aovs=["M_front", "M_back"])
+    empty = image.pixels[..., 3] == 0
+    assert 0.3 < empty.mean() < 0.9
+    assert image.aovs["M_front"][empty].max() == 0.0 and image.aovs["M_back"][empty].max() == 0.0
+
+
 def test_the_spacing_is_of_the_middle_channels_path():
     np.testing.assert_allclose(mean_free_path(MATERIALS["marble"]), 1 / (2.62 + 0.0041))
     skin = MATERIALS["skin"]
