@@ -1,0 +1,156 @@
+"""jimenez15's surface: separable diffusion in screen space (Jimenez et al. 2015, Separable Subsurface Scattering).
+
+The irradiance at the pixels is blurred along two directions that are at right angles on the surface, by a kernel per
+material whose reach in pixels follows the surface's distance and slope. Unlike the shipped demonstration of 2012 the
+kernel is not scaled by taste: it has the profile's total and, along the directions of the blurs, its response to edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wgsss import frame as shared
+from wgsss import wgsl
+from wgsss.errors import InputError, unknown
+from wgsss.frame import Frame
+from wgsss.graph import Handle
+from wgsss.methods.method import Diffused
+from wgsss.optics.separable import KERNELS, Term
+from wgsss.stage import Body, Stage
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class ScreenSpace:
+    """M_front as a separable kernel over the pixels of each object; M_back is not estimated."""
+
+    taps: int = field(default=17, metadata={"unit": "", "range": (5, 65), "help": "lookups per direction, odd"})
+    kernel: str = field(
+        default="line-spread",
+        metadata={"unit": "", "choices": tuple(KERNELS), "help": "how a profile becomes two passes"},
+    )
+
+    source: ClassVar[str] = "Jimenez et al. 2015, Separable Subsurface Scattering"
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = tuple({"taps": n} for n in (9, 17, 33, 65))
+
+    def __post_init__(self) -> None:
+        if self.taps % 2 == 0:
+            raise InputError(f"taps must be odd, not {self.taps}")
+        if self.kernel not in KERNELS:
+            raise unknown("kernel", self.kernel, tuple(KERNELS))
+
+    def bake(self, stage: Stage) -> None:
+        """The taps of each material's kernel."""
+        for body in stage.bodies:
+            self.weights(body)
+
+    def weights(self, body: Body) -> list[Taps]:
+        """The kernel of a body's material, a term for each pair of passes."""
+
+        def make() -> list[Taps]:
+            terms = KERNELS[self.kernel](body.material.profile)
+            return [Taps(body.stage.gpu, terms[0], term, self.taps // 2) for term in terms]
+
+        return body.stage.shared(("separable", id(body.material), self.kernel, self.taps), make)
+
+    def passes(self, frame: Frame) -> Diffused:
+        irradiance = shared.irradiance_pixels(frame)
+        M_front: Any = None
+        for body in frame.stage.bodies:
+            M_front = self.diffuse(frame, body, irradiance, M_front)
+        return Diffused(M_front, irradiance=irradiance)
+
+    def diffuse(self, frame: Frame, body: Body, irradiance: Handle, into: Handle | None) -> Handle:
+        """M_front of one body, drawn onto `into`."""
+        graph = frame.graph
+        entered = graph.draw(
+            "screen_space/enter",
+            size=frame.size,
+            surface=body.surface,
+            irradiance=irradiance,
+            **frame.seen("where_seen", "base_color", "depth"),
+        )
+        terms = self.weights(body)
+        before: Any = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
+        for term in terms:
+            blurred: Any = entered.entering
+            for direction in (0, 1):
+                last = direction == 1 and term is terms[-1]
+                blurred = graph.draw(
+                    "screen_space/blur",
+                    size=frame.size,
+                    into=into if last else None,
+                    label=f"{body.index} {'xy'[direction]}",
+                    params={
+                        "clip_to_world": frame.view.clip_to_world,
+                        "coarsest": term.coarsest,
+                        "direction": direction,
+                        "scale": term.scale,
+                    },
+                    surface=body.surface,
+                    taps=term.buffer,
+                    source=blurred,
+                    slope=entered.slope,
+                    before=before,
+                    **frame.seen("base_color"),
+                )
+            before = blurred
+        return before
+
+
+class Taps:
+    """A term of a kernel as weights of whole pixels, for any number of pixels per mm.
+
+    Attributes:
+        buffer: array<Tap> of wgsl/screen_space/blur.wgsl, level by level.
+        coarsest: pixels per mm of the first level, at which the whole kernel is within one pixel.
+        scale: (3,) what the two passes' result is multiplied by.
+    """
+
+    def __init__(self, gpu: Any, placed_by: Term, term: Term, sides: int) -> None:
+        module = wgsl.load("screen_space/blur")
+        levels = module.constants["LEVELS"]
+        self.coarsest = 0.5 / term.x[-1]
+        self.scale = term.scale
+        pixels_per_mm = self.coarsest * 2.0 ** (np.arange(levels) / LEVELS_PER_OCTAVE)
+        edges, offset = place(placed_by, pixels_per_mm, sides)
+        within = np.stack([np.interp(edges / pixels_per_mm[:, None], term.x, c) for c in term.within.T], axis=-1)
+        weight = np.diff(within, axis=1, prepend=0.0)
+        weight[:, 1:] *= 0.5  # to either side
+        value = {"weight": weight.reshape(-1, 3), "offset": offset.ravel()}
+        self.buffer = gpu.buffer(module.layout("array<Tap>").pack(value))
+
+
+LEVELS_PER_OCTAVE = 32.0  # as in wgsl/screen_space/blur.wgsl
+
+
+def place(term: Term, pixels_per_mm: Array, sides: int) -> tuple[Array, Array]:
+    """Which pixels `sides` taps to either side stand for, at each number of pixels per mm (L,).
+
+    All are edges between pixels: a step in the irradiance is one as well. The pixel in the middle has a tap of its
+    own; of what is beyond, each tap has an equal share, of the widest channel at each distance, or a single pixel.
+
+    Returns:
+        edges: (L, 1 + sides) pixels from the middle to where each tap ends; the last are at the kernel's range.
+        offset: (L, 1 + sides) the pixel that each tap is read at: it halves the tap's share.
+    """
+    densest = np.diff(term.within, axis=0).max(axis=1)
+    share = np.concatenate([[0.0], np.cumsum(densest)]) / densest.sum()
+    kept = np.concatenate([[True], np.diff(share) > 0.0])
+    x, share = term.x[kept], share[kept]
+    reach = np.maximum(np.round(term.x[-1] * pixels_per_mm - 0.5), 0.0) + 0.5
+    edges, offsets = [np.full(pixels_per_mm.shape, 0.5)], [np.zeros(pixels_per_mm.shape)]
+    for left in range(sides, 0, -1):
+        start = edges[-1]
+        done = np.interp(start / pixels_per_mm, x, share)
+        end = np.round(np.interp(done + (1.0 - done) / left, share, x) * pixels_per_mm - 0.5) + 0.5
+        end = np.maximum(end if left > 1 else reach, start + 1.0)
+        half = 0.5 * (done + np.interp(end / pixels_per_mm, x, share))
+        offsets.append(np.clip(np.round(np.interp(half, share, x) * pixels_per_mm), start + 0.5, end - 0.5))
+        edges.append(end)
+    return np.stack(edges, axis=1), np.stack(offsets, axis=1)
