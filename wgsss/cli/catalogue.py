@@ -30,11 +30,16 @@ def methods(args: Any) -> None:
         for entry in found:
             rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
             for knob in entry["knobs"]:
-                low, high = knob["range"]
-                unit = f" {knob['unit']}" if knob["unit"] else ""
-                text = f"--set {knob['name']}={knob['default']}  {knob['help']}, {low:g} to {high:.10g}{unit}"
-                rows.append(["", text])
+                rows.append(["", f"--set {knob['name']}={knob['default']}  {knob['help']}, {_values(knob)}"])
     arguments.tell(args, result, arguments.table(rows))
+
+
+def _values(knob: dict[str, Any]) -> str:
+    """What a knob may be set to, in words."""
+    if "choices" in knob:
+        return "one of " + ", ".join(knob["choices"])
+    low, high = knob["range"]
+    return f"{low:g} to {high:.10g}" + (f" {knob['unit']}" if knob["unit"] else "")
 
 
 def _described(kinds: Any) -> list[dict[str, Any]]:

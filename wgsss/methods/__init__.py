@@ -17,7 +17,8 @@ METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace, 
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
     """The method, or the reference, `name` with its knobs set.
 
-    Raises InputError for a name or knob that is not known, or a value that is not of the knob's type and range.
+    Raises InputError for a name or knob that is not known, or a value that is not of the knob's type and range, or not
+    one of its choices.
     """
     from wgsss.reference import REFERENCES
 
@@ -42,7 +43,12 @@ def name_of(method: Method) -> str:
 
 
 def _parsed(where: str, knob: Any, value: Any) -> Any:
-    """A knob's value, in the type of its default and within its range."""
+    """A knob's value: one of its choices, or in the type of its default and within its range."""
+    choices = knob.metadata.get("choices")
+    if choices is not None:
+        if value not in choices:
+            raise InputError(f"{where} must be one of {', '.join(choices)}, not '{value}'")
+        return value
     kind = type(knob.default)
     try:
         parsed = kind(float(value)) if kind is int and float(value).is_integer() else kind(value)
