@@ -1,0 +1,52 @@
+"""Spatial Adjacency Maps (Maisch & Ropinski 2017): what each vertex receives through the object, from a few senders."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from wgsss.bake.cache import Arrays, KeyPart, cached
+from wgsss.bake.sam.entries import BYTES, Entries
+from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.top import select_top
+from wgsss.errors import InputError, unknown
+from wgsss.gpu import Gpu
+from wgsss.optics import Profile
+from wgsss.scene.mesh import Mesh
+
+__all__ = ["SELECTIONS", "Entries", "spatial_adjacency_map"]
+
+SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {"top": select_top}
+"""Ways to choose the senders, by name."""
+
+MOST_BYTES = 1 << 30
+"""of the entries of a map"""
+_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
+_CODE: dict[str, tuple[Any, ...]] = {"top": (Entries, fan_areas)}
+
+
+def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, select: str) -> Entries:
+    """The map of a mesh with `samples` entries for each vertex, chosen as `select` says; cached.
+
+    Raises InputError for a selection that is not there, fewer than one sample, and a map of more than MOST_BYTES.
+    """
+    if select not in SELECTIONS:
+        raise unknown("selection", select, SELECTIONS)
+    if samples < 1:
+        raise InputError(f"{mesh.name}: a spatial adjacency map needs at least one sample, not {samples}")
+    size = BYTES * len(mesh.positions) * samples
+    if size > MOST_BYTES:
+        raise InputError(
+            f"{mesh.name}: {samples} samples for each of {len(mesh.positions)} vertices take {size} bytes, "
+            f"and a spatial adjacency map may have {MOST_BYTES}"
+        )
+
+    def make() -> Arrays:
+        return SELECTIONS[select](gpu, mesh, profile, samples).arrays()
+
+    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), samples, select]
+    found = cached("sam", [*key, gpu.name], make, code=(SELECTIONS[select], *_CODE[select]))
+    return Entries.of(found)

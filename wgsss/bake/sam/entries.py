@@ -1,0 +1,62 @@
+"""What a Spatial Adjacency Map holds for each vertex, whichever way it was chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.cache import Arrays
+from wgsss.bake.sam.tree import Tree
+from wgsss.bake.samples import Samples
+
+Array = npt.NDArray[Any]
+
+BYTES = 16
+"""of one entry: a sender and three weights"""
+
+
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """M_back at each of V vertices as a sum of n products (000 eq. 12): `weight` times what `sender` receives, L_d.
+
+    A sender is a vertex, or one of `samples`; or, where there is a `tree`, the mean over a node's vertices, weighted by
+    the areas of their fans.
+    """
+
+    sender: Array
+    """int32 (V, n): below `senders` a vertex or a sample, else the node `sender - senders`; -1 where there is none"""
+    weight: Array
+    """float32 (V, n, 3), without unit; 0 where there is no sender"""
+    senders: int
+    """V, or the number of samples"""
+    samples: Samples | None = None
+    tree: Tree | None = None
+
+    @property
+    def bytes_per_vertex(self) -> int:
+        return BYTES * self.sender.shape[1]
+
+    def arrays(self) -> Arrays:
+        """All of it by name, as the cache keeps it."""
+        parts = {"samples": self.samples, "tree": self.tree}
+        found = {f"{part}.{name}": a for part, held in parts.items() if held for name, a in vars(held).items()}
+        return {"sender": self.sender, "weight": self.weight, "senders": np.array(self.senders), **found}
+
+    @classmethod
+    def of(cls, arrays: Arrays) -> Entries:
+        """The entries that `arrays` gave these arrays."""
+
+        def part(kind: Any, name: str) -> Any:
+            held = {key.removeprefix(name): a for key, a in arrays.items() if key.startswith(name)}
+            return kind(**held) if held else None
+
+        samples, tree = part(Samples, "samples."), part(Tree, "tree.")
+        return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree)
+
+
+def empty(vertices: int, n: int) -> tuple[Array, Array]:
+    """Senders and weights of entries that are not there."""
+    return np.full((vertices, n), -1, np.int32), np.zeros((vertices, n, 3), np.float32)
