@@ -9,9 +9,15 @@ from wgsss.errors import InputError, unknown
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
 from wgsss.methods.point_cloud import PointCloud
+from wgsss.methods.sam import SpatialAdjacencyMaps
 from wgsss.methods.texture_space import TextureSpace
 
-METHODS: dict[str, type[Method]] = {"lambert": Lambert, "deon07": TextureSpace, "jensen02": PointCloud}
+METHODS: dict[str, type[Method]] = {
+    "lambert": Lambert,
+    "deon07": TextureSpace,
+    "jensen02": PointCloud,
+    "sam": SpatialAdjacencyMaps,
+}
 
 
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:

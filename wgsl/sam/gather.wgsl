@@ -1,0 +1,32 @@
+// M_back at the vertices: what their entries read (Maisch & Ropinski 2017, eq. 12), blended with what it was (eq. 17).
+
+import package::sam::entries::{Entry};
+import package::units::{Number};
+
+struct Params {
+    kept: Number, // share of what M_back was that stays, 1 - alpha
+    samples: u32, // entries of a vertex
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> entries: array<Entry>;
+@group(0) @binding(2) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over the nodes
+@group(0) @binding(3) var<storage, read_write> last: array<vec4f>; // M_back as it was, from frame to frame
+@group(0) @binding(4) var<storage, read_write> M_back: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&M_back) {
+        return;
+    }
+    var M = vec3f(0.0);
+    for (var k = id.x * params.samples; k < (id.x + 1u) * params.samples; k++) {
+        let entry = entries[k];
+        M += entry.weight * irradiance[max(entry.sender, 0)].rgb; // where there is no sender, the weight is 0
+    }
+    if params.kept > 0.0 {
+        M = mix(M, last[id.x].rgb, params.kept);
+    }
+    last[id.x] = vec4f(M, 1.0);
+    M_back[id.x] = vec4f(M, 1.0);
+}

@@ -1,0 +1,40 @@
+// M_back at the pixels: that at the vertices, between them.
+
+import package::mesh::{Vertex, Surface, color_after};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    world_to_clip: mat4x4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var<storage, read> M_back_at: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(4) var where_seen: texture_2d<f32>;
+@group(0) @binding(5) var base_color: texture_2d<f32>;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) M_back: vec3f,
+}
+
+struct Pixel {
+    @location(0) M_back: RGBA32Float,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    return Varying(params.world_to_clip * x, M_back_at[vertex.welded].rgb);
+}
+
+@fragment
+fn fs(in: Varying) -> Pixel {
+    let texel = vec2u(in.clip.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard; // another object is in front
+    }
+    return Pixel(vec4f(in.M_back * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));
+}

@@ -1,0 +1,121 @@
+// The entries of a mesh that deforms (Maisch & Ropinski 2017, 3.4): form factors follow areas and distances, and senders
+// give way to better neighbours.
+
+import package::sam::entries::{Entry};
+import package::sam::place::{Place};
+import package::units::{Number, Area};
+
+struct Params {
+    first: Number,  // of the table: log2 of a squared distance, mm^2
+    steps: Number,  // of the table, each time that squares double
+    samples: u32,   // entries of a vertex
+    receivers: u32, // where they begin among the places
+    anew: u32,      // 1: from the senders at rest
+    split: u32,     // 1 where senders count only from behind (eq. 13, 14)
+    moves: u32,     // 1 where senders are vertices and may give way
+}
+
+const MOST_MOVES: u32 = 8u;  // of an entry in a frame
+const BETTER: Number = 1e-4; // by less, it is not worth moving for what rounding may be
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> at_rest: array<Entry>;
+@group(0) @binding(2) var<storage, read> rest: array<Place>;      // of senders, nodes and receivers
+@group(0) @binding(3) var<storage, read> places: array<Place>;    // now
+@group(0) @binding(4) var<storage, read> adjacency: array<u32>;   // where each vertex's neighbours begin, then those
+@group(0) @binding(5) var<storage, read> table: array<vec4f>;     // log2 of R_d
+@group(0) @binding(6) var<storage, read_write> moved: array<i32>; // the senders, from frame to frame
+@group(0) @binding(7) var<storage, read_write> entries: array<Entry>;
+
+fn log_reflectance(squared: Area) -> vec3f {
+    let last = arrayLength(&table) - 1u;
+    let at = clamp((log2(max(squared, 1e-30)) - params.first) * params.steps, 0.0, f32(last));
+    let i = min(u32(at), last - 1u);
+    return mix(table[i].rgb, table[i + 1u].rgb, at - f32(i));
+}
+
+// log2 of what arrives from a place at a constant distance, its area times R_d (eq. 15).
+fn log_arriving(place: Place, receiver: Place) -> vec3f {
+    let between = place.position - receiver.position;
+    return log2(max(place.area, 1e-30)) + log_reflectance(dot(between, between) + place.variance);
+}
+
+fn is_behind(place: Place, receiver: Place) -> bool {
+    return dot(place.position - receiver.position, receiver.normal) < 0.0 && dot(place.normal, receiver.normal) < 0.0;
+}
+
+// The form factor from `sender`, from that of the entry at rest. In logarithms, nothing is divided by what vanishes.
+fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
+    if params.split == 1u && !is_behind(places[sender], places[receiver]) {
+        return vec3f(0.0);
+    }
+    let was = log_arriving(rest[sender], rest[receiver]);
+    var grown = log_arriving(places[sender], places[receiver]) - was;
+    if sender != entry.sender {
+        // At rest it had as much more as its area and distance tell; but what could be seen was less, or it would have
+        // been chosen.
+        let more = was - log_arriving(rest[entry.sender], rest[receiver]);
+        grown += select(more, min(more, vec3f(0.0)), is_behind(rest[sender], rest[receiver]));
+    }
+    return entry.weight * exp2(grown);
+}
+
+fn is_taken(sender: i32, first: u32, own: u32) -> bool {
+    for (var e = first; e < first + params.samples; e++) {
+        if e != own && moved[e] == sender {
+            return true;
+        }
+    }
+    return false;
+}
+
+fn is_better(K: vec3f, best: vec3f) -> bool {
+    return dot(K - (1.0 + BETTER) * best, vec3f(1.0)) > 0.0;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let first = id.x * params.samples;
+    if first >= arrayLength(&entries) {
+        return;
+    }
+    let receiver = params.receivers + id.x;
+    if params.anew == 1u {
+        for (var e = first; e < first + params.samples; e++) {
+            moved[e] = at_rest[e].sender;
+        }
+    }
+    for (var e = first; e < first + params.samples; e++) {
+        let entry = at_rest[e];
+        if entry.sender < 0 {
+            entries[e] = entry;
+            continue;
+        }
+        var sender = moved[e];
+        var best = form_factor(entry, sender, receiver);
+        if params.moves == 1u {
+            // What was best at rest may be so again, and be too far away to be found.
+            let home = form_factor(entry, entry.sender, receiver);
+            if is_better(home, best) && !is_taken(entry.sender, first, e) {
+                sender = entry.sender;
+                best = home;
+            }
+            for (var moves = 0u; moves < MOST_MOVES; moves++) {
+                let here = sender;
+                for (var j = adjacency[here]; j < adjacency[here + 1]; j++) {
+                    let neighbour = i32(adjacency[j]);
+                    let there = form_factor(entry, neighbour, receiver);
+                    if is_better(there, best) && !is_taken(neighbour, first, e) {
+                        sender = neighbour;
+                        best = there;
+                    }
+                }
+                if sender == here {
+                    break;
+                }
+            }
+            moved[e] = sender;
+        }
+        entries[e] = Entry(best, sender);
+    }
+}
