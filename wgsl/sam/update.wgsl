@@ -17,6 +17,7 @@ struct Params {
 
 const MOST_MOVES: u32 = 8u;  // of an entry in a frame
 const BETTER: Number = 1e-4; // by less, it is not worth moving for what rounding may be
+const SLACK: Number = 1e-4;  // nor for what rounding puts behind: the best are often at the limit
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> at_rest: array<Entry>;
@@ -40,13 +41,16 @@ fn log_arriving(place: Place, receiver: Place) -> vec3f {
     return log2(max(place.area, 1e-30)) + log_reflectance(dot(between, between) + place.variance);
 }
 
-fn is_behind(place: Place, receiver: Place) -> bool {
-    return dot(place.position - receiver.position, receiver.normal) < 0.0 && dot(place.normal, receiver.normal) < 0.0;
+// `slack`: how far beyond the limits of eq. 13 and 14, as a sine and a cosine.
+fn is_behind(place: Place, receiver: Place, slack: Number) -> bool {
+    let between = place.position - receiver.position;
+    return dot(between, receiver.normal) < slack * length(between) && dot(place.normal, receiver.normal) < slack;
 }
 
 // The form factor from `sender`, from that of the entry at rest. In logarithms, nothing is divided by what vanishes.
 fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
-    if params.split == 1u && !is_behind(places[sender], places[receiver]) {
+    let slack = select(-SLACK, SLACK, sender == entry.sender);
+    if params.split == 1u && !is_behind(places[sender], places[receiver], slack) {
         return vec3f(0.0);
     }
     let was = log_arriving(rest[sender], rest[receiver]);
@@ -55,22 +59,60 @@ fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
         // At rest it had as much more as its area and distance tell; but what could be seen was less, or it would have
         // been chosen.
         let more = was - log_arriving(rest[entry.sender], rest[receiver]);
-        grown += select(more, min(more, vec3f(0.0)), is_behind(rest[sender], rest[receiver]));
+        grown += select(more, min(more, vec3f(0.0)), is_behind(rest[sender], rest[receiver], 0.0));
     }
     return entry.weight * exp2(grown);
 }
 
-fn is_taken(sender: i32, first: u32, own: u32) -> bool {
-    for (var e = first; e < first + params.samples; e++) {
-        if e != own && moved[e] == sender {
-            return true;
-        }
+// Which of a vertex's entries has this sender; `first + params.samples`, where none has.
+fn holder(sender: i32, first: u32) -> u32 {
+    var e = first;
+    while e < first + params.samples && moved[e] != sender {
+        e++;
     }
-    return false;
+    return e;
 }
 
 fn is_better(K: vec3f, best: vec3f) -> bool {
     return dot(K - (1.0 + BETTER) * best, vec3f(1.0)) > 0.0;
+}
+
+// What was best at rest may be so again, and be too far away to be found. Who holds it meanwhile takes what is left.
+fn go_home(first: u32, receiver: u32) {
+    for (var e = first; e < first + params.samples; e++) {
+        let entry = at_rest[e];
+        if entry.sender < 0 || entry.sender == moved[e] {
+            continue;
+        }
+        let home = form_factor(entry, entry.sender, receiver);
+        if !is_better(form_factor(entry, moved[e], receiver), home) {
+            let other = holder(entry.sender, first);
+            if other < first + params.samples {
+                moved[other] = moved[e];
+            }
+            moved[e] = entry.sender;
+        }
+    }
+}
+
+// The best vertex for an entry that is uphill from its sender and that no other entry has.
+fn climb(e: u32, first: u32, receiver: u32) {
+    let entry = at_rest[e];
+    var best = form_factor(entry, moved[e], receiver);
+    for (var moves = 0u; moves < MOST_MOVES; moves++) {
+        let here = moved[e];
+        for (var j = adjacency[here]; j < adjacency[here + 1]; j++) {
+            let neighbour = i32(adjacency[j]);
+            let there = form_factor(entry, neighbour, receiver);
+            if is_better(there, best) && holder(neighbour, first) == first + params.samples {
+                moved[e] = neighbour;
+                best = there;
+            }
+        }
+        if moved[e] == here {
+            return;
+        }
+    }
 }
 
 @compute @workgroup_size(64)
@@ -85,37 +127,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             moved[e] = at_rest[e].sender;
         }
     }
+    if params.moves == 1u {
+        go_home(first, receiver);
+    }
     for (var e = first; e < first + params.samples; e++) {
         let entry = at_rest[e];
         if entry.sender < 0 {
             entries[e] = entry;
             continue;
         }
-        var sender = moved[e];
-        var best = form_factor(entry, sender, receiver);
         if params.moves == 1u {
-            // What was best at rest may be so again, and be too far away to be found.
-            let home = form_factor(entry, entry.sender, receiver);
-            if is_better(home, best) && !is_taken(entry.sender, first, e) {
-                sender = entry.sender;
-                best = home;
-            }
-            for (var moves = 0u; moves < MOST_MOVES; moves++) {
-                let here = sender;
-                for (var j = adjacency[here]; j < adjacency[here + 1]; j++) {
-                    let neighbour = i32(adjacency[j]);
-                    let there = form_factor(entry, neighbour, receiver);
-                    if is_better(there, best) && !is_taken(neighbour, first, e) {
-                        sender = neighbour;
-                        best = there;
-                    }
-                }
-                if sender == here {
-                    break;
-                }
-            }
-            moved[e] = sender;
+            climb(e, first, receiver);
         }
-        entries[e] = Entry(best, sender);
+        entries[e] = Entry(form_factor(entry, moved[e], receiver), moved[e]);
     }
 }

@@ -17,12 +17,13 @@ from wgsss import frame as shared
 from wgsss import wgsl
 from wgsss.errors import InputError, unknown
 from wgsss.frame import Frame
+from wgsss.gpu import Gpu
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
 from wgsss.optics.separable import KERNELS, Term
 from wgsss.stage import Body, Stage
 
-Array = NDArray[Any]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,12 +50,13 @@ class ScreenSpace:
         for body in stage.bodies:
             self.weights(body)
 
-    def weights(self, body: Body) -> list[Taps]:
-        """The kernel of a body's material, a term for each pair of passes."""
+    def weights(self, body: Body) -> list[tuple[Taps, Any]]:
+        """The kernel of a body's material, a term and its buffer for each pair of passes."""
 
-        def make() -> list[Taps]:
+        def make() -> list[tuple[Taps, Any]]:
             terms = KERNELS[self.kernel](body.material.profile)
-            return [Taps(body.stage.gpu, terms[0], term, self.taps // 2) for term in terms]
+            taps = [Taps(term, terms[0], self.taps // 2) for term in terms]
+            return [(t, t.upload(body.stage.gpu)) for t in taps]
 
         return body.stage.shared(("separable", id(body.material), self.kernel, self.taps), make)
 
@@ -72,61 +74,61 @@ class ScreenSpace:
             "screen_space/enter",
             size=frame.size,
             surface=body.surface,
+            params={"clip_to_world": frame.view.clip_to_world},
             irradiance=irradiance,
-            **frame.seen("where_seen", "base_color", "depth"),
+            **frame.seen("where_seen", "normal", "base_color", "depth"),
         )
         terms = self.weights(body)
-        before: Any = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
-        for term in terms:
-            blurred: Any = entered.entering
+        M: Any = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
+        for i, (taps, buffer) in enumerate(terms):
+            before, M = M, entered.entering
             for direction in (0, 1):
-                last = direction == 1 and term is terms[-1]
-                blurred = graph.draw(
+                M = graph.draw(
                     "screen_space/blur",
                     size=frame.size,
-                    into=into if last else None,
-                    label=f"{body.index} {'xy'[direction]}",
+                    into=into if direction == 1 and i == len(terms) - 1 else None,
+                    label="xy"[direction],
                     params={
                         "clip_to_world": frame.view.clip_to_world,
-                        "coarsest": term.coarsest,
+                        "scale": taps.scale,
                         "direction": direction,
-                        "scale": term.scale,
+                        "coarsest": taps.pixels_per_mm[0],
                     },
                     surface=body.surface,
-                    taps=term.buffer,
-                    source=blurred,
+                    taps=buffer,
+                    source=M,
                     slope=entered.slope,
                     before=before,
                     **frame.seen("base_color"),
                 )
-            before = blurred
-        return before
+        return M
 
 
 class Taps:
     """A term of a kernel as weights of whole pixels, for any number of pixels per mm.
 
     Attributes:
-        buffer: array<Tap> of wgsl/screen_space/blur.wgsl, level by level.
-        coarsest: pixels per mm of the first level, at which the whole kernel is within one pixel.
-        scale: (3,) what the two passes' result is multiplied by.
+        weight: (levels, 1 + sides, 3) of each of the two pixels that a tap reads, the one in the middle first. The
+            weights of a level sum to the term's integral.
+        offset: (levels, 1 + sides) pixels to either side.
+        pixels_per_mm: (levels,) ascending; at the first the whole kernel is within one pixel.
+        scale: (3,) what the result of the two passes is multiplied by.
     """
 
-    def __init__(self, gpu: Any, placed_by: Term, term: Term, sides: int) -> None:
-        module = wgsl.load("screen_space/blur")
-        levels = module.constants["LEVELS"]
-        self.coarsest = 0.5 / term.x[-1]
+    def __init__(self, term: Term, placed_by: Term, sides: int) -> None:
+        known = wgsl.load("screen_space/blur").constants
+        levels = np.arange(known["LEVELS"]) / known["LEVELS_PER_OCTAVE"]
+        self.pixels_per_mm = 0.5 / term.x[-1] * 2.0**levels
+        edges, self.offset = place(placed_by, self.pixels_per_mm, sides)
+        within = [np.interp(edges / self.pixels_per_mm[:, None], term.x, column) for column in term.within.T]
+        self.weight = np.diff(np.stack(within, axis=-1), axis=1, prepend=0.0)
+        self.weight[:, 1:] *= 0.5
         self.scale = term.scale
-        pixels_per_mm = self.coarsest * 2.0 ** (np.arange(levels) / LEVELS_PER_OCTAVE)
-        edges, offset = place(placed_by, pixels_per_mm, sides)
-        within = np.stack([np.interp(edges / pixels_per_mm[:, None], term.x, c) for c in term.within.T], axis=-1)
-        weight = np.diff(within, axis=1, prepend=0.0)
-        weight[:, 1:] *= 0.5  # to either side
-        value = {"weight": weight.reshape(-1, 3), "offset": offset.ravel()}
-        self.buffer = gpu.buffer(module.layout("array<Tap>").pack(value))
 
-
-LEVELS_PER_OCTAVE = 32.0  # as in wgsl/screen_space/blur.wgsl
+    def upload(self, gpu: Gpu) -> Any:
+        """A buffer of array<Tap> of wgsl/screen_space/blur.wgsl, level by level."""
+        value = {"weight": self.weight.reshape(-1, 3), "offset": self.offset.ravel()}
+        return gpu.buffer(wgsl.load("screen_space/blur").layout("array<Tap>").pack(value))
 
 
 def place(term: Term, pixels_per_mm: Array, sides: int) -> tuple[Array, Array]:

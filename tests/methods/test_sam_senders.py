@@ -1,0 +1,230 @@
+"""Maps that follow a mesh that deforms, against closed forms, sums and maps that are baked anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from maps import FRONT, MARBLE, PLAIN, SIDE, given, random_entries, rms
+from scenes import lit
+
+from wgsss import frame as shared
+from wgsss.bake.sam import Entries
+from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.samples import Samples
+from wgsss.errors import InputError
+from wgsss.graph import Graph
+from wgsss.methods import sam
+from wgsss.methods.sam_senders import places_at_rest
+from wgsss.scene import MATERIALS, Object, load_scene
+from wgsss.scene.shapes import slab, sphere
+from wgsss.stage import Stage
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Positions as a function of time."""
+
+    apply: object
+    period_s: float = 1.0
+
+
+def moving(mesh, apply, material=MARBLE):
+    scene = lit(SIDE, camera=FRONT)
+    return replace(scene, objects=(Object(mesh, material, motion=Moved(apply)),))
+
+
+class Followed:
+    """The entries of the one object of a stage at a time."""
+
+    def __init__(self, stage, time_s, method=PLAIN):
+        stage.pose(time_s)
+        graph = Graph(stage.gpu)
+        M_back = method.at_vertices(shared.begin(graph, stage, (8, 8)), stage.bodies[0])
+        passes = {p.module.name: p for p in graph.passes}
+        read = passes["sam/gather"].reads
+        wanted = [M_back, read["entries"], read["irradiance"], passes["sam/update"].reads["places"]]
+        graph.run(*wanted)
+        M, entries, L, self.places = (graph.read(h) for h in wanted)
+        self.M, self.irradiance = M[:, :3], L[:, :3]
+        self.sender = entries["sender"].reshape(len(M), -1)
+        self.weight = entries["weight"].reshape(*self.sender.shape, 3).astype(float)
+        self.mesh = stage.bodies[0].mesh
+
+
+def turn(x, time_s):
+    c, s = np.cos(time_s), np.sin(time_s)
+    return x @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + (30 * time_s, -20 * time_s, 5)
+
+
+def swollen(x, time_s):
+    return x * (1.0 + time_s)
+
+
+def twisted(x, time_s):
+    c, s = np.cos(0.1 * time_s * x[:, 1]), np.sin(0.1 * time_s * x[:, 1])
+    return np.stack([c * x[:, 0] - s * x[:, 2], x[:, 1], s * x[:, 0] + c * x[:, 2] * (1 + time_s)], axis=1)
+
+
+@pytest.mark.parametrize("nodes", [False, True], ids=["vertices", "nodes"])
+def test_rigid_motion_changes_nothing(gpu, monkeypatch, nodes):
+    mesh = sphere(6.0, 400)
+    if nodes:
+        given(monkeypatch, lambda mesh: entries)
+        entries = random_entries(mesh)
+    stage = Stage(gpu, moving(mesh, turn))
+    baked = PLAIN.map(stage.bodies[0])
+    for time_s in (0.0, 0.4, 0.9):
+        found = Followed(stage, time_s)
+        np.testing.assert_array_equal(found.sender, baked.sender)
+        np.testing.assert_allclose(found.weight, baked.weight, rtol=2e-3 if nodes else 2e-4, atol=1e-9)
+
+
+def test_uniform_growth_scales_areas_and_distances(gpu):
+    """K = F R(d) times what it was more at rest: F grows with the square of the size, d with the size."""
+    mesh, profile = sphere(6.0, 400), MARBLE.profile
+    stage = Stage(gpu, moving(mesh, swollen))
+    baked = PLAIN.map(stage.bodies[0])
+    d = np.linalg.norm(mesh.positions[baked.sender] - mesh.positions[:, None], axis=2)
+    for size in (1.25, 0.8):
+        found = Followed(stage, size - 1.0)
+        same = found.sender == baked.sender  # others are better now: what is near counts for more as all grows
+        assert same.mean() > 0.9
+        grown = size**2 * profile.reflectance(size * d) / profile.reflectance(d)
+        np.testing.assert_allclose(found.weight[same], (baked.weight * grown)[same], rtol=2e-3)
+
+
+def test_places_of_nodes_and_areas_of_fans(gpu, monkeypatch):
+    mesh = slab((12, 12, 2), 700)
+    entries = random_entries(mesh)
+    given(monkeypatch, lambda mesh: entries)
+    found = Followed(Stage(gpu, moving(mesh, twisted)), 0.5)
+    x = found.mesh.positions.astype(float)
+    area = np.zeros(len(x))
+    for a, b, c in mesh.faces:
+        area[[a, b, c]] += np.linalg.norm(np.cross(x[b] - x[a], x[c] - x[a])) / 6
+    V, over = len(x), entries.tree
+    np.testing.assert_allclose(found.places["area"][:V], area, rtol=1e-5)
+    np.testing.assert_allclose(found.places["position"][:V], x, atol=1e-5)
+    for k in range(len(over.first)):
+        under = over.order[over.first[k] : over.first[k] + over.count[k]]
+        middle = np.average(x[under], axis=0, weights=area[under])
+        variance = np.average(np.square(x[under] - middle).sum(axis=1), weights=area[under])
+        node = found.places[V + k]
+        np.testing.assert_allclose(node["position"], middle, atol=1e-5)
+        assert node["area"] == pytest.approx(area[under].sum(), rel=1e-5)
+        assert node["variance"] == pytest.approx(variance, rel=1e-4, abs=1e-5)
+
+
+def test_places_at_rest_are_those_of_a_mesh_that_does_not_move(gpu, monkeypatch):
+    mesh = slab((12, 12, 2), 700)
+    for entries in (random_entries(mesh), on_faces(mesh)):
+        given(monkeypatch, lambda mesh, entries=entries: entries)
+        found = Followed(Stage(gpu, moving(mesh, lambda x, time_s: x)), 0.5).places
+        for name, values in places_at_rest(mesh, entries).items():
+            np.testing.assert_allclose(found[name], values, rtol=1e-5, atol=2e-5)
+
+
+def on_faces(mesh, count=50):
+    """Entries whose senders are samples on faces."""
+    random = np.random.default_rng(5)
+    V = len(mesh.positions)
+    face = random.integers(0, len(mesh.faces), count).astype(np.int32)
+    samples = Samples(face, random.dirichlet((1, 1, 1), count), np.ones(count))
+    sender = random.integers(-1, count, (V, 3)).astype(np.int32)
+    return Entries(
+        sender, (random.random((V, 3, 3)) * (sender >= 0)[..., None]).astype(np.float32), count, samples, None
+    )
+
+
+def test_senders_that_are_no_vertices_follow_their_faces(gpu, monkeypatch):
+    mesh, size, profile = sphere(6.0, 400), 1.2, MARBLE.profile
+    entries = on_faces(mesh)
+    given(monkeypatch, lambda mesh: entries)
+    for size in (1.0, 1.2):
+        found = Followed(Stage(gpu, moving(mesh, swollen)), size - 1.0)
+        s = entries.samples
+        x = np.einsum("nk,nkd->nd", s.barycentric, mesh.positions[mesh.faces[s.face]].astype(float))
+        n = np.einsum("nk,nkd->nd", s.barycentric, mesh.normals[mesh.faces[s.face]].astype(float))
+        between = x[entries.sender] - mesh.positions[:, None]
+        d = np.linalg.norm(between, axis=2)
+        height, facing = (np.einsum("vnd,vd->vn", v, mesh.normals) for v in (between, n[entries.sender]))
+        back = (height < 0) & (facing < 0)
+        clear = (np.abs(height) > 1e-4) & (np.abs(facing) > 1e-4)
+        grown = size**2 * profile.reflectance(size * d) / profile.reflectance(d) * back[..., None]
+        np.testing.assert_allclose((found.weight)[clear], (entries.weight * grown)[clear], rtol=2e-3, atol=1e-9)
+        expected = np.einsum("vnc,vnc->vc", found.weight, found.irradiance[entries.sender])
+        np.testing.assert_allclose(found.M, expected, rtol=1e-4, atol=1e-9)
+
+
+def test_weights_stay_finite_where_the_profile_vanishes(gpu, monkeypatch):
+    """R_d of blue light in skin is 1e-40 and less across the ball at rest, and some at the end."""
+    mesh, skin = sphere(50.0, 200), MATERIALS["skin1"]
+    far = np.argmin(mesh.positions @ mesh.positions.T, axis=1).astype(np.int32)[:, None]
+    d = np.linalg.norm(mesh.positions - mesh.positions[far[:, 0]], axis=1)
+    K = skin.profile.reflectance(d)[:, None].astype(np.float32)
+    given(monkeypatch, lambda mesh: Entries(far, K, len(far), None, None))
+    stage = Stage(gpu, moving(mesh, lambda x, time_s: x * (1, 1, 1 - time_s), skin))
+    for time_s in (0.0, 0.5, 0.99):
+        found = Followed(stage, time_s)
+        assert np.isfinite(found.weight).all() and np.isfinite(found.M).all()
+        assert found.weight.max() < 1.0
+
+
+def sheared(x, time_s):
+    return np.stack([x[:, 0] + 2.0 * np.sin(np.pi * time_s) * x[:, 2], x[:, 1], x[:, 2]], axis=1)
+
+
+def test_senders_give_way_to_better_neighbours_and_come_back(gpu):
+    """A plate of 2 mm whose sides slide past each other by 4 mm: what is behind a vertex is soon another part."""
+    mesh, profile = slab((12, 12, 2), 700), MARBLE.profile
+    stage = Stage(gpu, moving(mesh, sheared))
+    baked = PLAIN.map(stage.bodies[0])
+    followed = [Followed(stage, time_s) for time_s in np.linspace(0.0, 1.0, 17)]
+    np.testing.assert_array_equal(followed[0].sender, baked.sender)
+    np.testing.assert_array_equal(followed[-1].sender, baked.sender)
+
+    half = followed[8]
+    anew = sam.spatial_adjacency_map(gpu, half.mesh, profile, PLAIN.samples, PLAIN.select)
+    inner = (np.abs(mesh.positions[:, :2]).max(axis=1) < 3.5) & (np.abs(mesh.positions[:, 2]) > 0.9)
+    best = anew.weight[inner].sum()
+    fixed = np.linalg.norm(half.mesh.positions[baked.sender] - half.mesh.positions[:, None], axis=2)
+    assert (fan_areas(half.mesh)[baked.sender, None] * profile.reflectance(fixed))[inner].sum() < 0.4 * best
+    assert 0.92 * best < half.weight[inner].sum() < 1.001 * best
+    assert all(len(set(own[own >= 0])) == (own >= 0).sum() for own in half.sender), "no sender twice"
+
+
+def psnr(M, reference):
+    return 20.0 * np.log10(reference.max() / rms(M - reference))
+
+
+def test_a_map_that_follows_the_wave_is_as_good_as_one_baked_anew(gpu):
+    """Against the sum over all vertices on the back side, over two seconds: half a period."""
+    scene = load_scene("wave", vertices=600)
+    stage = Stage(gpu, scene)
+    profile = scene.objects[0].material.profile
+    lost = []
+    for frame in range(21):
+        found = Followed(stage, frame / 10)
+        if frame % 5:
+            continue
+        x, n = (v.astype(float) for v in (found.mesh.positions, found.mesh.normals))
+        between = x[None] - x[:, None]
+        behind = (np.einsum("oid,od->oi", between, n) < 0) & (n @ n.T < 0)
+        L = found.irradiance
+        K = fan_areas(found.mesh)[:, None] * profile.reflectance(np.linalg.norm(between, axis=2)) * behind[..., None]
+        everything = np.einsum("oic,ic->oc", K, L)
+        anew = sam.spatial_adjacency_map(gpu, found.mesh, profile, PLAIN.samples, PLAIN.select)
+        M = np.einsum("vnc,vnc->vc", anew.weight, L[anew.sender])
+        followed = np.einsum("vnc,vnc->vc", found.weight, L[found.sender])
+        lost.append(psnr(M, everything) - psnr(followed, everything))
+    print(lost)
+    assert np.abs(lost).max() < 1.5
+
+
+def test_topology_that_changes_is_an_error_that_names_the_frame(gpu):
+    stage = Stage(gpu, moving(sphere(6.0, 100), lambda x, time_s: x if time_s < 0.5 else x[:-1]))
+    stage.pose(0.4)
+    with pytest.raises(InputError, match=r"a deformation must keep 92 positions, 0\.6 s into its motion"):
+        stage.pose(0.6)
