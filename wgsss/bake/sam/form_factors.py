@@ -1,0 +1,163 @@
+"""Form factors between reduced triangle fans (000 eq. 11), integrated over both on the GPU."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss import wgsl
+from wgsss.bake.sam.parts import Fans, Parts
+from wgsss.gpu import Gpu
+from wgsss.graph import Graph
+from wgsss.optics import Profile
+from wgsss.scene.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+_MODULE = "sam/form_factors"
+TOLERANCE = 0.002
+"""by which parts may be off, by the estimate that says how fine they are cut. See the tests for what comes of it"""
+FINEST = 7  # cuts of a fan, at most
+_DARK = 0.01  # of the brightest channel's R: what a channel that is darker is off by matters less
+_TURNS = 60_000  # of a shader's loops: lavapipe ends them after 65,535, those of nested ones together
+_POINTS = 1_000_000  # on the device at once
+_SUBMISSION = 0.4  # seconds that a dispatch may take
+_FIRST_RATE = 1e7  # pairs of points per second that any device manages
+
+
+@dataclass(frozen=True, eq=False)
+class Reflectance:
+    """R_d over the squared distance, by its leading bits as a float32."""
+
+    R: Array
+    """float32 (k, 4), 1/mm^2"""
+    first: int
+    """the leading bits of the first row"""
+    bend: Array
+    """float64 (k,): by how much of itself R differs from a straight line over a change of the squared distance as large
+    as itself, to second order: q^2 |d^2R/dq^2| / R with q = r^2, of the channel where it is most"""
+
+    @property
+    def squares(self) -> Array:
+        """float64 (k,), mm^2: the squared distances."""
+        return squares(self.first, self.first + len(self.R))
+
+
+def squares(first: int, end: int) -> Array:
+    """The squared distances (end - first,), mm^2, whose leading bits count up from `first`."""
+    bits = np.arange(first, end, dtype=np.uint32) << np.uint32(shift())
+    return bits.view(np.float32).astype(np.float64)
+
+
+def shift() -> int:
+    """Bits of a squared distance that tables leave out."""
+    return wgsl.load(_MODULE).constants["SHIFT"]
+
+
+def reflectance(profile: Profile, farthest: float) -> Reflectance:
+    """R_d up to `farthest` mm. Nearer than a thousandth of what half of the light travels it is level."""
+    lit = profile.total > 0.0
+    nearest = 1e-3 * float(profile.range(0.5)[lit].min()) if lit.any() else 1.0
+    first, last = (int(np.float32(r * r).view(np.uint32)) >> shift() for r in (nearest, max(farthest, 2.0 * nearest)))
+    q = squares(first, last + 2)
+    R = profile.reflectance(np.sqrt(q))
+    u = np.log(q)
+    slope = np.gradient(R, u, axis=0)
+    curved = np.abs(np.gradient(slope, u, axis=0) - slope)
+    bend = (curved / np.maximum(R + _DARK * R.max(axis=1, keepdims=True), 1e-300)).max(axis=1)
+    return Reflectance(np.column_stack([R, np.zeros(len(q))]).astype(np.float32), first, bend)
+
+
+def form_factors(gpu: Gpu, mesh: Mesh, profile: Profile, pairs: Array) -> Array:
+    """K_oi (P, 3), float32, of pairs (P, 2) of vertices o and i: without unit.
+
+    The mean over the fan of o of the integral over the fan of i of R_d(|x_i - x_o|). Fans are cut into parts as small
+    as the profile bends at their distance; far apart, each counts as one. 0 for vertices without a fan.
+    """
+    return FormFactors(gpu, mesh, profile).of(pairs)
+
+
+class FormFactors:
+    """The form factors of one mesh and profile, a few at a time."""
+
+    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
+        self.gpu, self.fans = gpu, Fans(mesh)
+        self.R = reflectance(profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))) + 1e-3)
+        self.table = gpu.buffer(self.R.R)
+        self.rate = _FIRST_RATE
+
+    def of(self, pairs: Array) -> Array:
+        """As `form_factors`."""
+        pairs = np.asarray(pairs, np.int64).reshape(-1, 2)
+        K = np.zeros((len(pairs), 3))
+        both = (self.fans.area[pairs] > 0.0).all(axis=1)
+        cuts = np.where(both, self._cuts(pairs), -1)
+        for n in np.unique(cuts[both]):
+            chosen = np.flatnonzero(cuts == n)
+            K[chosen] = self._integrated(pairs[chosen], int(n))
+        return K.astype(np.float32)
+
+    def _cuts(self, pairs: Array) -> Array:
+        """How finely (P,) the fans of each pair are cut, so that R bends little over a part."""
+        fans, (o, i) = self.fans, pairs.T
+        d = fans.centre[i] - fans.centre[o]
+        square = np.einsum("pk,pk->p", d, d)
+        q = square + fans.extent[o] + fans.extent[i]
+        # What moves along d changes the distance most: of a fan, what lies across its normal.
+        along = sum(
+            fans.extent[v] * np.maximum(1.0 - np.einsum("pk,pk->p", d, fans.normal[v]) ** 2 / np.maximum(square, 1e-30), 0.25)
+            for v in (o, i)
+        )
+        error = np.interp(q, self.R.squares, self.R.bend) * along / np.maximum(q, 1e-30)
+        finer = np.ceil(np.sqrt(error / TOLERANCE / 12.0)).astype(np.int64) + 1
+        return np.where(error < TOLERANCE, 0, np.where(error < 6.0 * TOLERANCE, 1, np.clip(finer, 2, FINEST)))
+
+    def _integrated(self, pairs: Array, cuts: int) -> Array:
+        """K (P, 3) with all fans cut alike."""
+        points = self.fans.points(cuts)
+        work = points[pairs[:, 0]] * points[pairs[:, 1]]
+        K = np.zeros((len(pairs), 3))
+        first = 0
+        while first < len(pairs):
+            ahead = slice(first, first + max(int(self.rate * _SUBMISSION), 1))
+            within = np.cumsum(work[ahead]) <= self.rate * _SUBMISSION
+            within &= np.cumsum(points[pairs[ahead]].sum(axis=1)) <= _POINTS
+            some = slice(first, first + max(int(within.sum()), 1))
+            K[some] = self._dispatch(pairs[some], self.fans.parts(np.unique(pairs[some]), cuts))
+            first = some.stop
+        return K / self.fans.area[pairs[:, :1]]
+
+    def _dispatch(self, pairs: Array, parts: Parts) -> Array:
+        start = time.perf_counter()
+        at = np.searchsorted(parts.vertex, pairs)
+        (o, i), (o_end, i_end) = parts.start[at].T, parts.start[at + 1].T
+        step = np.maximum(_TURNS // (i_end - i + 1), 1)
+        count = -(-(o_end - o) // step)
+        which = np.repeat(np.arange(len(pairs)), count)
+        starts = np.cumsum(count) - count
+        o_first = o[which] + (np.arange(len(which)) - starts[which]) * step[which]
+        terms = {
+            "o_first": o_first,
+            "o_end": np.minimum(o_first + step[which], o_end[which]),
+            "i_first": i[which],
+            "i_end": i_end[which],
+        }
+        graph = Graph(self.gpu)
+        sums = graph.dispatch(
+            _MODULE,
+            size=len(which),
+            params={"first_entry": self.R.first},
+            table=self.table,
+            points={"position": parts.centre, "area": parts.area, "extent": parts.extent},
+            terms=terms,
+        )
+        graph.run(sums)
+        found = np.add.reduceat(graph.read(sums)[:, :3].astype(np.float64), starts, axis=0)
+        done = float(((o_end - o) * (i_end - i)).sum())
+        rate = done / (time.perf_counter() - start)
+        self.rate = float(np.clip(rate, self.rate / 2, self.rate * 4)) if done > 1e5 else self.rate
+        return found
