@@ -33,6 +33,7 @@ KNOBS: dict[str, dict[str, Any]] = {
     "deon07": {"map_size": 256},
     "jensen02": {"spacing": 6.0},
     "crowd jensen02": {"spacing": 20.0},  # heads are large beside what skin scatters over
+    "sam": {"surface": "screen"},
 }
 TIME_S = 0.7  # what moves is not at rest
 

@@ -118,11 +118,11 @@ def deforming(body: Body, entries: Entries) -> Deforming:
 
 def log_table(profile: Profile, diagonal: float) -> tuple[float, float, Array]:
     """log2 of R_d (n, 4; the last column is 0), evenly over log2 of squared distances: the first, the steps to one."""
-    ends = 2.0 * np.log2([_NEAREST * diagonal, _FARTHEST * diagonal])
-    R = profile.reflectance(np.exp2(0.5 * np.linspace(*ends, _TABLE)))
+    low, high = 2.0 * np.log2([_NEAREST * diagonal, _FARTHEST * diagonal])
+    R = profile.reflectance(np.exp2(0.5 * np.linspace(low, high, _TABLE)))
     table = np.zeros((_TABLE, 4))
     table[:, :3] = np.log2(np.maximum(R, _LEAST))
-    return float(ends[0]), (_TABLE - 1) / float(ends[1] - ends[0]), table
+    return float(low), (_TABLE - 1) / float(high - low), table
 
 
 def places_at_rest(mesh: Mesh, entries: Entries) -> dict[str, Array]:
