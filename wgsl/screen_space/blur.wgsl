@@ -1,55 +1,73 @@
 // One direction of a separable blur over the surface of one object, as it is seen (Jimenez et al. 2015, section 5).
 //
 // The first direction runs along the rows of the image, the second at right angles to it on the surface, whatever way
-// that faces: the two tangents follow from the depth and its slope. Weights are of whole pixels, by how many of them
-// a millimetre of the surface spans there.
+// that faces. Weights are of whole pixels, by how many of them a millimetre of the surface spans there.
 
-import package::units::{Number, Position};
+import package::units::{Length, Number, Position};
 import package::mesh::{Surface, color_after};
-import package::screen::{screen_corner, position_of_pixel};
+import package::screen::{screen_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
-    coarsest: f32,  // pixels per mm of level 0
-    direction: u32, // 0 or 1
     scale: vec3f,   // of what comes out of the second direction
+    direction: u32, // 0 or 1
+    coarsest: f32,  // pixels per mm of level 0
 }
 
 struct Tap {
-    weight: vec3f,  // of each of the two pixels
-    offset: Number, // pixels to either side
+    weight: vec3f, // of each of the two pixels
+    offset: f32,   // pixels to either side
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> surface: Surface;
 @group(0) @binding(2) var<storage, read> taps: array<Tap>; // of each level, the one in the middle first
-@group(0) @binding(3) var source: texture_2d<f32>; // rgb; 1 - depth, 0 off the object
-@group(0) @binding(4) var slope: texture_2d<f32>;
+@group(0) @binding(3) var source: texture_2d<f32>; // alpha: 1 - depth, 0 off the object
+@group(0) @binding(4) var slope: texture_2d<f32>;  // of the depth, per pixel to the right and down
 @group(0) @binding(5) var base_color: texture_2d<f32>;
-@group(0) @binding(6) var before: texture_2d<f32>; // the kernel's terms so far, or a single black texel
+@group(0) @binding(6) var before: texture_2d<f32>; // M by the kernel's terms so far, or a single black texel
 
 struct Pixel {
-    @location(0) diffused: RGBA32Float, // first direction: as source; second: M in W/m^2
+    @location(0) blurred: RGBA32Float, // first direction: as source; second: M in W/m^2
 }
 
-const LEVELS: u32 = 448u;
-const LEVELS_PER_OCTAVE: f32 = 32.0;
+const LEVELS: u32 = 448u; // to where a kernel spans the largest image
+const LEVELS_PER_OCTAVE: u32 = 32u; // it is 1 % too wide or too narrow at most
 
-// A tap counts in full while it is within 20 degrees of the tangent plane and not at all from 45 degrees on: what is
-// farther off lies round a bend or across a step. Its weight goes to the middle.
-const SINE_KEPT: Number = 0.35;
-const SINE_LOST: Number = 0.7;
+// A tap counts in full where the surface has bent away by up to 45 degrees since the tap before it, and not at all from
+// 63 degrees on: this is a step to another surface. Nor does any tap beyond. Their weight goes to the middle, so that
+// uniform light stays uniform.
+const TURN_KEPT: Number = 1.0;
+const TURN_LOST: Number = 2.0;
+
+// A walk from the middle to one side, tap by tap.
+struct Walk {
+    kept: Number,  // how much a tap here counts
+    gone: Length,  // from the middle, were the surface the plane that it is there
+    off: Length,   // how far behind that plane it is
+}
+
+// On to a pixel where source's alpha is `seen`. The way there is in clip space, seen from the middle (`from_middle`):
+// `flat` on the plane, and `rise` by how much the depth differs from its.
+fn walked(walk: Walk, seen: f32, flat: vec4f, rise: f32, away: vec4f, w: f32) -> Walk {
+    let plane = flat.xyz / (w + flat.w);
+    let way = flat + away * rise;
+    let gone = length(plane);
+    let off = sign(rise) * length(way.xyz / (w + way.w) - plane);
+    let turn = abs(off - walk.off) / max(gone - walk.gone, 1e-9);
+    let kept = select(1.0 - smoothstep(TURN_KEPT, TURN_LOST, turn), 0.0, seen == 0.0);
+    return Walk(min(walk.kept, kept), gone, off);
+}
+
+// A step in clip space turned so that its xyz, over w + its own w, is the way in mm from x, whose clip w is w.
+fn from_middle(step: vec4f, x: Position) -> vec4f {
+    return vec4f(step.xyz - x * step.w, step.w);
+}
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return screen_corner(i);
-}
-
-// The way in clip space that `step` (pixels) and a change of depth make.
-fn clip_step(step: vec2f, depth: f32) -> vec4f {
-    let ndc = step * vec2f(2.0, -2.0) / vec2f(textureDimensions(source));
-    return params.clip_to_world * vec4f(ndc, depth, 0.0);
 }
 
 @fragment
@@ -59,37 +77,36 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if middle.a == 0.0 {
         discard;
     }
-    let size = vec2f(textureDimensions(source));
-    let ndc = vec2f(2.0 * pixel.x / size.x - 1.0, 1.0 - 2.0 * pixel.y / size.y);
-    let here = params.clip_to_world * vec4f(ndc, 1.0 - middle.a, 1.0);
-    let x: Position = here.xyz / here.w;
+    let per_pixel = vec2f(2.0, -2.0) / vec2f(textureDimensions(source));
+    let here = params.clip_to_world * vec4f(pixel.xy * per_pixel + vec2f(-1.0, 1.0), 1.0 - middle.a, 1.0);
+    let x = here.xyz / here.w;
     let rises = textureLoad(slope, texel, 0).rg;
-    let to_right = clip_step(vec2f(1.0, 0.0), rises.x);
-    let down = clip_step(vec2f(0.0, 1.0), rises.y);
-    let t_x = (to_right.xyz - x * to_right.w) / here.w; // mm of the surface per pixel
-    let t_y = (down.xyz - x * down.w) / here.w;
-    let n = normalize(cross(t_x, t_y));
-    var step = vec2f(1.0, 0.0); // pixels, one along the longer side
-    var mm_per_step = length(t_x);
+    let away = from_middle(params.clip_to_world[2], x);
+    let right = from_middle(params.clip_to_world[0] * per_pixel.x, x) + away * rises.x; // pixel by pixel on the plane
+    let down = from_middle(params.clip_to_world[1] * per_pixel.y, x) + away * rises.y;
+    let t_x = right.xyz / here.w; // mm per pixel
+    let t_y = down.xyz / here.w;
+    var step = vec2f(1.0, 0.0); // to the next pixel, along the rows or along the columns
     if params.direction == 1u {
         let lean = -dot(t_x, t_y) / dot(t_x, t_x);
-        let longer = max(abs(lean), 1.0);
-        step = vec2f(lean, 1.0) / longer;
-        mm_per_step = length(t_y + lean * t_x) / longer;
+        step = vec2f(lean, 1.0) / max(abs(lean), 1.0);
     }
-    let level = round(LEVELS_PER_OCTAVE * -log2(params.coarsest * mm_per_step));
+    let level = -f32(LEVELS_PER_OCTAVE) * log2(params.coarsest * length(step.x * t_x + step.y * t_y));
     let count = arrayLength(&taps) / LEVELS;
-    let first = count * u32(clamp(level, 0.0, f32(LEVELS - 1u)));
+    let first = count * u32(clamp(round(level), 0.0, f32(LEVELS - 1u)));
     var total = taps[first].weight * middle.rgb;
-    for (var i = 2u; i < 2u * count; i++) {
-        let tap = taps[first + i / 2u];
-        let moved = vec2i(round(step * tap.offset * (1.0 - 2.0 * f32(i & 1u))));
+    var ahead = Walk(1.0, 0.0, 0.0);
+    var back = ahead;
+    for (var k = first + 1u; k < first + count; k++) {
+        let tap = taps[k];
+        let moved = vec2i(round(step * tap.offset));
         let there = textureLoad(source, texel + moved, 0); // zeros outside of the image
-        let way = clip_step(vec2f(moved), middle.a - there.a);
-        let d = (way.xyz - x * way.w) / (here.w + way.w);
-        let off = abs(dot(d, n)) / max(length(d), 1e-9);
-        let kept = select(1.0 - smoothstep(SINE_KEPT, SINE_LOST, off), 0.0, there.a == 0.0);
-        total += tap.weight * mix(middle.rgb, there.rgb, kept);
+        let opposite = textureLoad(source, texel - moved, 0);
+        let flat = f32(moved.x) * right + f32(moved.y) * down;
+        let rise = dot(vec2f(moved), rises);
+        ahead = walked(ahead, there.a, flat, middle.a - there.a - rise, away, here.w);
+        back = walked(back, opposite.a, -flat, middle.a - opposite.a + rise, away, here.w);
+        total += tap.weight * (mix(middle.rgb, there.rgb, ahead.kept) + mix(middle.rgb, opposite.rgb, back.kept));
     }
     if params.direction == 0u {
         return Pixel(vec4f(total, middle.a));

@@ -145,7 +145,7 @@ def place(term: Term, pixels_per_mm: Array, sides: int) -> tuple[Array, Array]:
     share = np.concatenate([[0.0], np.cumsum(densest)]) / densest.sum()
     kept = np.concatenate([[True], np.diff(share) > 0.0])
     x, share = term.x[kept], share[kept]
-    reach = np.maximum(np.round(term.x[-1] * pixels_per_mm - 0.5), 0.0) + 0.5
+    reach = np.ceil(term.x[-1] * pixels_per_mm - 0.5) + 0.5
     edges, offsets = [np.full(pixels_per_mm.shape, 0.5)], [np.zeros(pixels_per_mm.shape)]
     for left in range(sides, 0, -1):
         start = edges[-1]

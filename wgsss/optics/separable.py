@@ -19,15 +19,15 @@ Array = NDArray[np.float64]
 
 BEYOND = 0.003  # share of the light that may leave farther away than the kernels reach
 _CELLS = 96  # from 0 to the range, ever wider: the narrowest of skin's Gaussians spans several
-_TABLE = 2000  # distances that shares are tabulated at; the error of reading between them is below 1e-5
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_TABLE = 2000  # distances that shares are tabulated at: reading between them errs by less than 1e-5
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
 @dataclass(frozen=True, eq=False)
 class Term:
     """One product scale k(x) k(y), with k even.
 
-    `x` (n,) in mm from 0 to the kernel's range, ascending; `within` (n, 3) the integral of k from -x to x; `scale` (3,).
+    `x` (n,) in mm from 0 to the kernel's range, ascending; `within` (n, 3) what k has from -x to x; `scale` (3,).
     """
 
     x: Array
@@ -73,7 +73,7 @@ def radial(profile: Profile) -> tuple[Term]:
     return (Term(x, within / np.where(within[-1] > 0.0, within[-1], 1.0), profile.total),)
 
 
-KERNELS = {"line-spread": line_spread, "svd": svd, "radial": radial}
+KERNELS: dict[str, Callable[[Profile], tuple[Term, ...]]] = {"line-spread": line_spread, "svd": svd, "radial": radial}
 
 
 def _cells(profile: Profile, n: int) -> Array:
@@ -104,6 +104,6 @@ def _within_rectangle(profile: Profile, x: Array) -> Array:
 
 def _enclosed(profile: Profile, x: Array) -> Callable[[Array], Array]:
     """The share (..., 3) within a radius, from a table: it is asked for at many."""
-    r = np.concatenate([[0.0], np.geomspace(1e-8 * x[-1], 1e3 * x[-1], _TABLE)])
+    r = np.concatenate([[0.0], np.geomspace(1e-5 * x[-1], 10.0 * x[-1], _TABLE)])
     table = profile.enclosed(r)
     return lambda radius: np.stack([np.interp(radius, r, column) for column in table.T], axis=-1)
