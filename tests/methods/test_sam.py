@@ -44,6 +44,8 @@ class Passes:
         frame = shared.begin(graph, stage, size)
         diffused = method.passes(frame)
         gathers = [p for p in graph.passes if p.module.name == "sam/gather"]
+        # Of a map in parts the last pass has all.
+        gathers = [p for p in gathers if p.writes["M_back"].version == p.writes["M_back"].resource.version]
         read = [h for p in gathers for h in (p.writes["M_back"], p.reads["irradiance"])]
         graph.run(*read, diffused.M_front, *([diffused.M_back] if diffused.M_back else []))
         self.at_vertices = [graph.read(h)[:, :3] for h in read[::2]]
@@ -187,7 +189,7 @@ def test_more_samples_come_closer_to_the_integral_under_any_light(gpu):
         errors = [rms(Passes(stage, replace(PLAIN, samples=n)).at_vertices[0] - back) / rms(back) for n in (3, 32, 256)]
         print(name, errors)
         assert np.isfinite(errors).all()
-        assert errors[0] > 1.5 * errors[1] > 6.0 * errors[2]
+        assert errors[1] < 0.6 * errors[0] and errors[2] < 0.3 * errors[1]
         assert errors[2] < 0.12
 
 

@@ -14,6 +14,7 @@ from wgsss.bake.sam import Entries
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError
+from wgsss.gpu import LIMITS
 from wgsss.graph import Graph
 from wgsss.methods import sam
 from wgsss.methods.sam_senders import places_at_rest
@@ -228,3 +229,24 @@ def test_topology_that_changes_is_an_error_that_names_the_frame(gpu):
     stage.pose(0.4)
     with pytest.raises(InputError, match=r"a deformation must keep 92 positions, 0\.6 s into its motion"):
         stage.pose(0.6)
+
+
+@pytest.mark.parametrize("moves", [False, True], ids=["still", "moving"])
+def test_a_map_too_large_for_a_binding_is_read_in_parts(gpu, monkeypatch, moves):
+    mesh = slab((12, 12, 2), 700)
+    scene = moving(mesh, twisted) if moves else lit(SIDE, mesh=mesh, material=MARBLE, camera=FRONT)
+
+    def M_back():
+        stage = Stage(gpu, scene)
+        stage.pose(0.5)
+        graph = Graph(gpu)
+        M = PLAIN.at_vertices(shared.begin(graph, stage, (8, 8)), stage.bodies[0])
+        graph.run(M)
+        return graph.read(M), len([p for p in graph.ran if p.module.name == "sam/gather"])
+
+    whole, parts = M_back()
+    monkeypatch.setitem(LIMITS, "max-storage-buffer-binding-size", 300 * 3 * 16 + 5)
+    got, more = M_back()
+    assert (parts, more) == (1, 3)
+    np.testing.assert_array_equal(got, whole)
+    assert whole[:, :3].any()

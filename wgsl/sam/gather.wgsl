@@ -6,6 +6,7 @@ import package::units::{Number};
 struct Params {
     kept: Number, // share of what M_back was that stays, 1 - alpha
     samples: u32, // entries of a vertex
+    first: u32,   // vertex that the entries begin with
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -16,17 +17,19 @@ struct Params {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= arrayLength(&M_back) {
+    let first = id.x * params.samples;
+    if first >= arrayLength(&entries) {
         return;
     }
+    let i = params.first + id.x;
     var M = vec3f(0.0);
-    for (var k = id.x * params.samples; k < (id.x + 1u) * params.samples; k++) {
+    for (var k = first; k < first + params.samples; k++) {
         let entry = entries[k];
         M += entry.weight * irradiance[max(entry.sender, 0)].rgb; // where there is no sender, the weight is 0
     }
     if params.kept > 0.0 {
-        M = mix(M, last[id.x].rgb, params.kept);
+        M = mix(M, last[i].rgb, params.kept);
     }
-    last[id.x] = vec4f(M, 1.0);
-    M_back[id.x] = vec4f(M, 1.0);
+    last[i] = vec4f(M, 1.0);
+    M_back[i] = vec4f(M, 1.0);
 }

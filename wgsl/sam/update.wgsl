@@ -6,10 +6,10 @@ import package::sam::place::{Place};
 import package::units::{Number, Area};
 
 struct Params {
-    first: Number,  // of the table: log2 of a squared distance, mm^2
+    low: Number,    // of the table: log2 of a squared distance, mm^2
     steps: Number,  // of the table, each time that squares double
     samples: u32,   // entries of a vertex
-    receivers: u32, // where they begin among the places
+    receivers: u32, // where those of the entries begin among the places
     anew: u32,      // 1: from the senders at rest
     split: u32,     // 1 where senders count only from behind (eq. 13, 14)
     moves: u32,     // 1 where senders are vertices and may give way
@@ -30,7 +30,7 @@ const SLACK: Number = 1e-4;  // nor for what rounding puts behind: the best are 
 
 fn log_reflectance(squared: Area) -> vec3f {
     let last = arrayLength(&table) - 1u;
-    let at = clamp((log2(max(squared, 1e-30)) - params.first) * params.steps, 0.0, f32(last));
+    let at = clamp((log2(max(squared, 1e-30)) - params.low) * params.steps, 0.0, f32(last));
     let i = min(u32(at), last - 1u);
     return mix(table[i].rgb, table[i + 1u].rgb, at - f32(i));
 }
@@ -118,8 +118,8 @@ fn climb(e: u32, first: u32, receiver: u32) {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let first = id.x * params.samples;
-    if first >= arrayLength(&entries) {
-        return;
+    if id.y > 0u || first >= arrayLength(&entries) {
+        return; // the size of what is dispatched is that of `entries`
     }
     let receiver = params.receivers + id.x;
     if params.anew == 1u {

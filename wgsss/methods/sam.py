@@ -12,14 +12,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss import wgsl
 from wgsss.bake.sam import SELECTIONS, Entries, spatial_adjacency_map
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
-from wgsss.methods.sam_senders import follow, over_nodes, sender_samples
+from wgsss.methods.sam_senders import blocks, follow, over_nodes, sender_samples, upload
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.stage import Body, Stage
@@ -93,22 +92,30 @@ class SpatialAdjacencyMaps:
         V, samples = entries.sender.shape
         last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(np.zeros((V, 4), np.float32))))
         passed = last.passed(stage.time_s)
-        chosen: Any = stage.shared(("entries", id(entries)), lambda: stage.gpu.buffer(packed(entries)))
         placed, points = self._points(body)
-        if body.rest.motion is None:
-            area = stage.shared(("fans", id(mesh)), lambda: stage.gpu.buffer(fan_areas(mesh).astype(np.float32)))
-        else:
+        chosen: list[Any] = stage.shared(("entries", id(entries)), lambda: upload(stage.gpu, entries))
+        area: Any = None
+        if body.rest.motion is not None:
             chosen, area = follow(graph, body, entries, points, chosen, anew=passed == 0.0)
         nodes = 0 if entries.tree is None else len(entries.tree.first)
         irradiance = shared.irradiance_points(frame, body, points, placed + nodes)
-        return graph.dispatch(
-            "sam/gather",
-            size=V,
-            params={"kept": KEPT_A_SECOND**passed if passed > 0.0 else 0.0, "samples": samples},
-            entries=chosen,
-            irradiance=over_nodes(graph, body, entries, "sam/means", "irradiance", irradiance=irradiance, area=area),
-            last=last.M_back,
-        )
+        if entries.tree is not None:
+            fans = stage.shared(("fans", id(mesh)), lambda: stage.gpu.buffer(fan_areas(mesh).astype(np.float32)))
+            bindings = {"irradiance": irradiance, "area": area or fans}
+            irradiance = over_nodes(graph, body, entries, "sam/means", "irradiance", **bindings)
+        params = {"kept": KEPT_A_SECOND**passed if passed > 0.0 else 0.0, "samples": samples}
+        M_back: Any = None
+        for block, some in zip(blocks(entries), chosen, strict=True):
+            M_back = graph.dispatch(
+                "sam/gather",
+                size=V if M_back is None else block.stop - block.start,
+                params={**params, "first": block.start},
+                entries=some,
+                irradiance=irradiance,
+                last=last.M_back,
+                **({} if M_back is None else {"M_back": M_back}),
+            )
+        return M_back
 
     def _points(self, body: Body) -> tuple[int, Any]:
         """How many points a body's map has, and a buffer of array<Vertex> of them as posed. Of a moving body only the
@@ -137,9 +144,3 @@ class Last:
         passed = 0.0 if self.time_s is None else time_s - self.time_s
         self.time_s = time_s
         return max(passed, 0.0)
-
-
-def packed(entries: Entries) -> bytes:
-    """Entries as the shaders read them."""
-    layout = wgsl.load("sam/gather").layout("array<Entry>")
-    return layout.pack({"weight": entries.weight.reshape(-1, 3), "sender": entries.sender.ravel()})

@@ -14,8 +14,10 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.sam import Entries
+from wgsss.bake.sam.entries import BYTES
 from wgsss.bake.sam.fans import adjacency, fan_areas
 from wgsss.bake.samples import Samples
+from wgsss.gpu import LIMITS, Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
 from wgsss.scene import Mesh
@@ -44,6 +46,22 @@ def sender_samples(mesh: Mesh, entries: Entries, *, moving: bool) -> Samples:
         return entries.samples
     both = (entries.samples, vertices(mesh))
     return Samples(*(np.concatenate([vars(s)[name] for s in both]) for name in ("face", "barycentric", "share")))
+
+
+def blocks(entries: Entries) -> list[slice]:
+    """The vertices of a map in parts whose entries fit in a binding."""
+    V, samples = entries.sender.shape
+    most = LIMITS["max-storage-buffer-binding-size"] // (BYTES * samples)
+    return [slice(first, min(first + most, V)) for first in range(0, V, most)]
+
+
+def upload(gpu: Gpu, entries: Entries) -> list[Any]:
+    """Buffers of array<Entry> (wgsl/sam/entries.wgsl), one for each block."""
+    layout = wgsl.load("sam/gather").layout("array<Entry>")
+    return [
+        gpu.buffer(layout.pack({"weight": entries.weight[b].reshape(-1, 3), "sender": entries.sender[b].ravel()}))
+        for b in blocks(entries)
+    ]
 
 
 def over_nodes(graph: Graph, body: Body, entries: Entries, module: str, over: str, **bindings: Any) -> Any:
@@ -88,12 +106,12 @@ class Deforming:
     """buffer of u32: where each vertex's neighbours begin, behind which they are"""
     table: Any
     """buffer of vec4f: log2 of R_d"""
-    first: float
+    low: float
     """log2 of the first squared distance of the table, mm^2"""
     steps: float
     """of the table, each time that squared distances double"""
-    moved: Any
-    """buffer of i32: the senders, from frame to frame"""
+    moved: list[Any]
+    """buffers of i32, by block: the senders, from frame to frame"""
 
 
 def deforming(body: Body, entries: Entries) -> Deforming:
@@ -103,16 +121,16 @@ def deforming(body: Body, entries: Entries) -> Deforming:
     starts, corners = _triangles(mesh, entries)
     next_to = adjacency(mesh)
     near = next_to.start.astype(np.int64) + len(next_to.start)
-    first, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
+    low, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
     return Deforming(
         gpu.buffer(layout.pack(places_at_rest(mesh, entries))),
         gpu.buffer(starts.astype(np.uint32)),
         gpu.buffer(corners.astype(np.uint32)),
         gpu.buffer(np.concatenate([near, next_to.vertex]).astype(np.uint32)),
         gpu.buffer(table.astype(np.float32)),
-        first,
+        low,
         steps,
-        gpu.buffer(entries.sender.astype(np.int32)),
+        [gpu.buffer(entries.sender[block].astype(np.int32)) for block in blocks(entries)],
     )
 
 
@@ -164,12 +182,12 @@ def _triangles(mesh: Mesh, entries: Entries) -> tuple[Array, Array]:
     return 3 * np.append(0, np.cumsum(count)), faces.ravel()
 
 
-def follow(graph: Graph, body: Body, entries: Entries, points: Any, at_rest: Any, *, anew: bool) -> tuple[Any, Any]:
-    """Of a body as posed: its map's entries and, by sender, fan areas.
+def follow(graph: Graph, body: Body, entries: Entries, points: Any, at_rest: list[Any], *, anew: bool) -> Any:
+    """Of a body as posed: its map's entries, by block, and fan areas, by sender.
 
     Args:
         points: a buffer of array<Vertex>, the map's points as posed.
-        at_rest: a buffer of the map's entries at rest.
+        at_rest: buffers of the map's entries at rest, by block.
         anew: from the senders at rest, and not from those of the last frame.
     """
     stage = body.stage
@@ -177,24 +195,20 @@ def follow(graph: Graph, body: Body, entries: Entries, points: Any, at_rest: Any
     count = points.size // wgsl.load("sam/fans").layout("array<Vertex>").size
     nodes = 0 if entries.tree is None else len(entries.tree.first)
     posed = graph.dispatch("sam/fans", size=count + nodes, points=points, starts=kept.starts, corners=kept.corners)
-    V, samples = entries.sender.shape
-    found = graph.dispatch(
-        "sam/update",
-        size=V * samples,
-        params={
-            "first": kept.first,
+    places = over_nodes(graph, body, entries, "sam/places", "places", places=posed.places)
+    samples = entries.sender.shape[1]
+    found = []
+    for block, some, moved in zip(blocks(entries), at_rest, kept.moved, strict=True):
+        params = {
+            "low": kept.low,
             "steps": kept.steps,
             "samples": samples,
-            "receivers": 0 if entries.samples is None else entries.senders,
+            "receivers": block.start + (0 if entries.samples is None else entries.senders),
             "anew": anew,
             "split": entries.tree is None,
             "moves": entries.tree is None and entries.samples is None,
-        },
-        at_rest=at_rest,
-        rest=kept.rest,
-        places=over_nodes(graph, body, entries, "sam/places", "places", places=posed.places),
-        adjacency=kept.adjacency,
-        table=kept.table,
-        moved=kept.moved,
-    )
+        }
+        bindings = {"places": places, "rest": kept.rest, "adjacency": kept.adjacency, "table": kept.table}
+        size = (block.stop - block.start, samples)
+        found.append(graph.dispatch("sam/update", size=size, params=params, at_rest=some, moved=moved, **bindings))
     return found, posed.area
