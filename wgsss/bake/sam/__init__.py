@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from wgsss.bake.cache import Arrays, KeyPart, cached
+from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.top import select_top
+from wgsss.bake.sam.tree import tree
 from wgsss.errors import InputError, unknown
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
@@ -25,7 +28,8 @@ SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {"top": se
 MOST_BYTES = 1 << 30
 """of the entries of a map"""
 _PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
-_CODE: dict[str, tuple[Any, ...]] = {"top": (Entries, fan_areas)}
+_FANS = (Entries, fan_areas, Fans, FormFactors, "sam/form_factors")
+_CODE: dict[str, tuple[Any, ...]] = {"top": (*_FANS, Blocks, tree, "sam/top")}
 
 
 def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, select: str) -> Entries:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam.parts import Fans, Parts
+from wgsss.bake.sam.parts import Fans, Points
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
@@ -19,9 +19,11 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 _MODULE = "sam/form_factors"
-TOLERANCE = 0.002
-"""by which parts may be off, by the estimate that says how fine they are cut. See the tests for what comes of it"""
-FINEST = 7  # cuts of a fan, at most
+# What taking fans for points is off by, to second order, up to which a point each will do, one for each quad, Gauss' of
+# order 2, 3, and so on. K is then off by half a percent at most; see the tests.
+_BENT = (0.004, 0.012, 0.5, 4.0, 10.0)
+MOST = len(_BENT)
+"""the highest order of Gauss' points in a quad"""
 _DARK = 0.01  # of the brightest channel's R: what a channel that is darker is off by matters less
 _TURNS = 60_000  # of a shader's loops: lavapipe ends them after 65,535, those of nested ones together
 _POINTS = 1_000_000  # on the device at once
@@ -75,8 +77,8 @@ def reflectance(profile: Profile, farthest: float) -> Reflectance:
 def form_factors(gpu: Gpu, mesh: Mesh, profile: Profile, pairs: Array) -> Array:
     """K_oi (P, 3), float32, of pairs (P, 2) of vertices o and i: without unit.
 
-    The mean over the fan of o of the integral over the fan of i of R_d(|x_i - x_o|). Fans are cut into parts as small
-    as the profile bends at their distance; far apart, each counts as one. 0 for vertices without a fan.
+    The mean over the fan of o of the integral over the fan of i of R_d(|x_i - x_o|). By Gauss' points, as many as
+    the profile bends over the fans; far apart, each counts as one. 0 for vertices without a fan.
     """
     return FormFactors(gpu, mesh, profile).of(pairs)
 
@@ -90,59 +92,62 @@ class FormFactors:
         self.table = gpu.buffer(self.R.R)
         self.rate = _FIRST_RATE
 
-    def of(self, pairs: Array) -> Array:
-        """As `form_factors`."""
+    def of(self, pairs: Array, most: int = MOST) -> Array:
+        """As `form_factors`, by points of the order `most` at most."""
         pairs = np.asarray(pairs, np.int64).reshape(-1, 2)
         K = np.zeros((len(pairs), 3))
         both = (self.fans.area[pairs] > 0.0).all(axis=1)
-        cuts = np.where(both, self._cuts(pairs), -1)
-        for n in np.unique(cuts[both]):
-            chosen = np.flatnonzero(cuts == n)
-            K[chosen] = self._integrated(pairs[chosen], int(n))
+        orders = np.where(both, np.minimum(self._orders(pairs), most), -1)
+        for order in np.unique(orders[both]):
+            chosen = np.flatnonzero(orders == order)
+            K[chosen] = self._integrated(pairs[chosen], int(order))
         return K.astype(np.float32)
 
-    def _cuts(self, pairs: Array) -> Array:
-        """How finely (P,) the fans of each pair are cut, so that R bends little over a part."""
+    def _orders(self, pairs: Array) -> Array:
+        """Of which order (P,) the points for each pair are, so that they tell how R bends over a fan."""
+        bent = self._bent(pairs)
+        return np.searchsorted(_BENT, bent, side="right")
+
+    def _bent(self, pairs: Array) -> Array:
+        """(P,): what taking whole fans as points is off by, as a share of K, to second order."""
         fans, (o, i) = self.fans, pairs.T
         d = fans.centre[i] - fans.centre[o]
-        square = np.einsum("pk,pk->p", d, d)
+        square = np.maximum(np.einsum("pk,pk->p", d, d), 1e-30)
         q = square + fans.extent[o] + fans.extent[i]
-        # What moves along d changes the distance most: of a fan, what lies across its normal.
-        along = sum(
-            fans.extent[v] * np.maximum(1.0 - np.einsum("pk,pk->p", d, fans.normal[v]) ** 2 / np.maximum(square, 1e-30), 0.25)
-            for v in (o, i)
-        )
-        error = np.interp(q, self.R.squares, self.R.bend) * along / np.maximum(q, 1e-30)
-        finer = np.ceil(np.sqrt(error / TOLERANCE / 12.0)).astype(np.int64) + 1
-        return np.where(error < TOLERANCE, 0, np.where(error < 6.0 * TOLERANCE, 1, np.clip(finer, 2, FINEST)))
+        along = np.zeros(len(q))  # mm^2: what moves along d changes the distance, and in a fan nothing moves along n
+        for v in (o, i):
+            across = np.square(np.einsum("pk,pk->p", d, fans.normal[v])) / square
+            along += fans.extent[v] * np.maximum(1.0 - across, 0.25)
+        return np.interp(q, self.R.squares, self.R.bend) * along / np.maximum(q, 1e-30)
 
-    def _integrated(self, pairs: Array, cuts: int) -> Array:
-        """K (P, 3) with all fans cut alike."""
-        points = self.fans.points(cuts)
-        work = points[pairs[:, 0]] * points[pairs[:, 1]]
+    def _integrated(self, pairs: Array, order: int) -> Array:
+        """K (P, 3) by points of one order."""
+        count = self.fans.count(order)
+        work = count[pairs[:, 0]] * count[pairs[:, 1]]
         K = np.zeros((len(pairs), 3))
         first = 0
         while first < len(pairs):
             ahead = slice(first, first + max(int(self.rate * _SUBMISSION), 1))
             within = np.cumsum(work[ahead]) <= self.rate * _SUBMISSION
-            within &= np.cumsum(points[pairs[ahead]].sum(axis=1)) <= _POINTS
+            within &= np.cumsum(count[pairs[ahead]].sum(axis=1)) <= _POINTS
             some = slice(first, first + max(int(within.sum()), 1))
-            K[some] = self._dispatch(pairs[some], self.fans.parts(np.unique(pairs[some]), cuts))
+            K[some] = self._dispatch(pairs[some], self.fans.points(np.unique(pairs[some]), order))
             first = some.stop
         return K / self.fans.area[pairs[:, :1]]
 
-    def _dispatch(self, pairs: Array, parts: Parts) -> Array:
+    def _dispatch(self, pairs: Array, points: Points) -> Array:
         start = time.perf_counter()
-        at = np.searchsorted(parts.vertex, pairs)
-        (o, i), (o_end, i_end) = parts.start[at].T, parts.start[at + 1].T
-        step = np.maximum(_TURNS // (i_end - i + 1), 1)
+        at = np.searchsorted(points.vertex, pairs)
+        (o, i), (o_end, i_end) = points.start[at].T, points.start[at + 1].T
+        # Alike for all, since invocations that walk in step take as many turns as the longest loops of any.
+        step = max(_TURNS // int((i_end - i + 1).max()), 1)
         count = -(-(o_end - o) // step)
         which = np.repeat(np.arange(len(pairs)), count)
         starts = np.cumsum(count) - count
-        o_first = o[which] + (np.arange(len(which)) - starts[which]) * step[which]
+        o_first = o[which] + (np.arange(len(which)) - starts[which]) * step
         terms = {
             "o_first": o_first,
-            "o_end": np.minimum(o_first + step[which], o_end[which]),
+            "o_end": np.minimum(o_first + step, o_end[which]),
             "i_first": i[which],
             "i_end": i_end[which],
         }
@@ -152,7 +157,7 @@ class FormFactors:
             size=len(which),
             params={"first_entry": self.R.first},
             table=self.table,
-            points={"position": parts.centre, "area": parts.area, "extent": parts.extent},
+            points={"position": points.position, "area": points.area, "extent": points.extent},
             terms=terms,
         )
         graph.run(sums)

@@ -1,4 +1,4 @@
-"""Reduced fans in parts, each a point that knows how far it extends."""
+"""Reduced fans as points: for what is far away, few that know how far they extend; for what is near, Gauss points."""
 
 from __future__ import annotations
 
@@ -13,36 +13,35 @@ from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
-# The two halves of a quad, by its vertex a and the others b, c of the face: the corners' barycentric coordinates.
-_A, _AB, _AC, _G = np.array([[1, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
-_HALVES = np.array([[_A, _AB, _G], [_A, _G, _AC]])
+# The corners of a quad, in turn, by the barycentric coordinates of its face, that of its vertex first.
+_QUAD = np.array([[1, 0, 0], [0.5, 0.5, 0], [1 / 3, 1 / 3, 1 / 3], [0.5, 0, 0.5]])
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """The parts of some fans: those of vertex[k] from start[k] to start[k + 1]."""
+class Points:
+    """Points for some fans: those of vertex[k] from start[k] to start[k + 1]."""
 
     vertex: Array
     """int64 (k,), ascending"""
     start: Array
     """int64 (k + 1,)"""
-    centre: Array
-    """float64 (N, 3), mm: the parts' centroids"""
+    position: Array
+    """float64 (N, 3), mm"""
     area: Array
     """float64 (N,), mm^2"""
     extent: Array
-    """float64 (N,), mm^2: mean squared distance of a part from its centroid"""
+    """float64 (N,), mm^2: of what each stands for, mean squared distance from it"""
 
 
 class Fans:
-    """The fans of a mesh, each as a whole and in parts."""
+    """The fans of a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
         found = kites(mesh)
         self.start, self.corner = found.start.astype(np.int64), found.corner
         self.positions, self.faces = mesh.positions, mesh.faces
         self.normal = mesh.normals.astype(np.float64)
-        centre, area, extent = self._merged(*self._halves(self.corner))  # of each quad
+        centre, area, extent = self._quads(self.corner)
         at = np.repeat(np.arange(len(mesh.positions)), np.diff(self.start))
 
         def total(values: Array) -> Array:
@@ -57,52 +56,44 @@ class Fans:
         self.extent = total(area * (extent + np.einsum("nk,nk->n", off, off))) / safe
         """float64 (V,), mm^2: mean squared distances from the centroids"""
 
-    def points(self, cuts: int) -> Array:
-        """How many (V,) parts fans have, as `parts` cuts them."""
-        return np.diff(self.start) * 2 * (cuts - 1) ** 2 if cuts > 1 else np.diff(self.start) ** cuts
+    def count(self, order: int) -> Array:
+        """How many (V,) points fans have of an order."""
+        quads = np.diff(self.start)
+        return quads * order**2 if order else np.minimum(quads, 1)
 
-    def parts(self, vertex: Array, cuts: int) -> Parts:
-        """The fans of some vertices (k,), ascending, in parts: whole for 0 `cuts`, in quads for 1, and for more with
-        each half of a quad, a triangle, cut into (cuts - 1)^2 equal ones."""
-        if not cuts:
-            return Parts(vertex, np.arange(len(vertex) + 1), self.centre[vertex], self.area[vertex], self.extent[vertex])
+    def points(self, vertex: Array, order: int) -> Points:
+        """The fans of some vertices (k,), ascending: as one point each for `order` 0, of each quad one for 1, and
+        beyond that order^2, Gauss' for polynomials of degree 2 order - 1 along each side."""
+        if not order:
+            one = np.arange(len(vertex) + 1)
+            return Points(vertex, one, self.centre[vertex], self.area[vertex], self.extent[vertex])
         count = np.diff(self.start)[vertex]
         ends = np.cumsum(count)
         corner = self.corner[np.repeat(self.start[vertex] - ends + count, count) + np.arange(ends[-1])]
-        halves = self._halves(corner)
-        if cuts == 1:
-            centre, area, extent = self._merged(*halves)
-        else:
-            n = cuts - 1
-            centre = np.einsum("sk,qhkd->qhsd", _triangles(n), self._corners(corner)).reshape(-1, 3)
-            area, extent = (np.repeat(value.ravel(), n * n) / (n * n) for value in halves[1:])
-        start = np.concatenate([[0], ends]) * (len(area) // len(corner))
-        return Parts(vertex, start, centre, area, extent)
+        start = np.concatenate([[0], ends]) * order**2
+        if order == 1:
+            return Points(vertex, start, *self._quads(corner))
+        x, w = np.polynomial.legendre.leggauss(order)
+        s, t = (0.5 * (a.ravel() + 1.0) for a in np.meshgrid(x, x))
+        shares = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t])
+        along_s, along_t = np.stack([t - 1, 1 - t, t, -t]), np.stack([s - 1, -s, s, 1 - s])
+        quad = self._corners(corner)
+        position, ds, dt = (np.einsum("kg,qkd->qgd", of, quad) for of in (shares, along_s, along_t))
+        area = 0.25 * np.outer(w, w).ravel() * np.linalg.norm(np.cross(ds, dt), axis=2)
+        return Points(vertex, start, position.reshape(-1, 3), area.ravel(), np.zeros(area.size))
 
     def _corners(self, corner: Array) -> Array:
-        """float64 (q, 2, 3, 3): the corners of the halves of quads."""
+        """float64 (q, 4, 3): the corners of quads."""
         face, k = corner // 3, corner % 3
         turned = self.faces[face[:, None], (k[:, None] + np.arange(3)) % 3]
-        return np.einsum("hkc,qcd->qhkd", _HALVES, self.positions[turned].astype(np.float64))
+        return np.einsum("kc,qcd->qkd", _QUAD, self.positions[turned].astype(np.float64))
 
-    def _halves(self, corner: Array) -> tuple[Array, Array, Array]:
-        """Centroids (q, 2, 3), areas (q, 2) and extents (q, 2) of the halves of quads."""
-        at = self._corners(corner)
-        side = np.roll(at, -1, axis=2) - at
-        area = 0.5 * np.linalg.norm(np.cross(side[:, :, 0], side[:, :, 1]), axis=2)
-        return at.mean(axis=2), area, np.einsum("qhkd,qhkd->qh", side, side) / 36.0
-
-    @staticmethod
-    def _merged(centre: Array, area: Array, extent: Array) -> tuple[Array, Array, Array]:
-        """Two halves of equal area as one."""
+    def _quads(self, corner: Array) -> tuple[Array, Array, Array]:
+        """Centroids (q, 3), areas (q,) and extents (q,) of quads, by their halves, triangles of equal area."""
+        halves = self._corners(corner)[:, [[0, 1, 2], [0, 2, 3]]]
+        side = np.roll(halves, -1, axis=2) - halves
+        area = np.linalg.norm(np.cross(side[:, :, 0], side[:, :, 1]), axis=2).sum(axis=1) / 2.0
+        centre = halves.mean(axis=2)
         apart = centre[:, 1] - centre[:, 0]
-        return centre.mean(axis=1), area.sum(axis=1), extent.mean(axis=1) + 0.25 * np.einsum("qd,qd->q", apart, apart)
-
-
-def _triangles(n: int) -> Array:
-    """Barycentric coordinates (n^2, 3) of the centroids of the parts of a triangle that is cut n times each side."""
-    i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-    upright = np.stack([i, j], axis=1)[i + j < n] + 1.0 / 3.0
-    turned = np.stack([i, j], axis=1)[i + j < n - 1] + 2.0 / 3.0
-    ab = np.concatenate([upright, turned]) / n
-    return np.column_stack([ab, 1.0 - ab.sum(axis=1)])
+        extent = np.einsum("qhkd,qhkd->q", side, side) / 72.0 + np.einsum("qd,qd->q", apart, apart) / 4.0
+        return centre.mean(axis=1), area, extent

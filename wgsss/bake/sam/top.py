@@ -2,38 +2,131 @@
 
 from __future__ import annotations
 
+import sys
+import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from wgsss import wgsl
+from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.entries import Entries, empty
-from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.gpu import Gpu
+from wgsss.graph import Graph
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
+_MODULE = "sam/top"
 BEYOND = 1e-3
 """share of the light of a plane that comes from farther away than what is looked at"""
-_BLOCK = 256
+_LISTED = 64  # blocks that a group looks at first; four times as many each time that they are not enough
+_SUBMISSION = 0.4  # seconds that a dispatch may take
+_FIRST_RATE = 1e3  # groups per second that any device manages
+_CHUNK = 1 << 22  # pairs of a group and a block at once
+_SLOTS = 1 << 21  # of entries at once: a dispatch has 65,535 workgroups at most
 
 
 def select_top(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
-    """The n vertices of largest K_oi (000 eq. 11), all channels together, on each vertex' back side (eq. 13, 14)."""
-    x, N, area = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64), fan_areas(mesh)
-    sender, weight = empty(len(x), n)
-    reach = float(profile.range(BEYOND).max())
-    for first in range(0, len(x), _BLOCK):
-        o = np.arange(first, min(first + _BLOCK, len(x)))
-        away = x[None] - x[o][:, None]
-        r = np.linalg.norm(away, axis=2)
-        back = (np.einsum("oid,od->oi", away, N[o]) < 0) & (N[o] @ N.T < 0) & (r < reach)
-        K = np.where(back[..., None], profile.reflectance(r) * area[:, None], 0.0) * (area[o] > 0)[:, None, None]
-        total = K.sum(axis=2)
-        best = np.argsort(-total, axis=1, kind="stable")[:, :n]
-        found = np.take_along_axis(total, best, axis=1) > 0
-        sender[o, : best.shape[1]] = np.where(found, best, -1)
-        weight[o, : best.shape[1]] = np.where(found[..., None], np.take_along_axis(K, best[..., None], axis=1), 0.0)
-    return Entries(sender, weight, len(x))
+    """The n vertices of largest K_oi (000 eq. 11), all channels together, on each vertex' back side (eq. 13, 14).
+
+    Those that come nearest to it by their fans' areas and mean squared distances are integrated, and more than n, so
+    that the best of them are by the integral. Beyond the distance from where a share BEYOND of the light of a plane
+    comes, nothing is looked for.
+    """
+    sender, weight = empty(len(mesh.positions), n)
+    factors = FormFactors(gpu, mesh, profile)
+    search = Search(gpu, mesh, profile, factors, n + 5 + n // 2)
+    from tqdm import tqdm
+
+    shown = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
+    with tqdm(total=len(mesh.positions), file=sys.stderr, disable=None, **shown) as bar:
+        for receivers, found in search:
+            rows, columns = np.nonzero(found >= 0)
+            pairs = np.stack([receivers[rows], found[rows, columns]], axis=1)
+            rough = np.zeros(found.shape)
+            rough[rows, columns] = factors.of(pairs, most=1).sum(axis=1)
+            best = np.argsort(-rough, axis=1, kind="stable")[:, :n]
+            chosen = np.take_along_axis(found, best, axis=1)
+            rows, columns = np.nonzero(chosen >= 0)
+            K = np.zeros((*chosen.shape, 3), np.float32)
+            K[rows, columns] = factors.of(np.stack([receivers[rows], chosen[rows, columns]], axis=1))
+            order = np.argsort(-K.sum(axis=2), axis=1, kind="stable")
+            sender[receivers], weight[receivers] = (
+                np.take_along_axis(chosen, order, axis=1),
+                np.take_along_axis(K, order[..., None], axis=1),
+            )
+            bar.update(len(receivers))
+    return Entries(sender, weight, len(mesh.positions))
+
+
+class Search:
+    """Goes over the vertices of a mesh, some at a time, with the `kept` best senders of each: by the area of their fans
+    and R_d at the root of the mean squared distance between them. -1 where there are no more."""
+
+    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile, factors: FormFactors, kept: int) -> None:
+        self.gpu, self.kept, self.rate = gpu, kept, _FIRST_RATE
+        constants = wgsl.load(_MODULE).constants
+        self.group, self.lanes = constants["GROUP"], constants["GROUP"] // constants["FOUR"]
+        self.blocks = Blocks(mesh, factors.fans, factors.R, float(profile.range(BEYOND).max()))
+        self.tables = gpu.buffer(np.concatenate([self.blocks.total, self.blocks.reach]))
+        self.vertices, self.buffer = gpu.buffer(self.blocks.vertices), gpu.buffer(self.blocks.ranges)
+
+    def __iter__(self) -> Iterator[tuple[Array, Array]]:
+        order, edges = self.blocks.order, self.blocks.edges
+        first, end = 0, len(edges) - 1 if len(order) else 0
+        most = min(max(_CHUNK // max(end, 1), 1), _SLOTS // (self.group * self.kept))
+        while first < end:
+            groups = np.arange(first, min(first + int(np.clip(self.rate * _SUBMISSION, 1, most)), end))
+            found = self._best(groups, _LISTED, 1 + self.kept // 8)
+            is_there = np.arange(self.group) < np.diff(edges)[groups, None]
+            listed = found[is_there]
+            first = int(groups[-1]) + 1
+            yield order[edges[groups[0]] : edges[first]], np.where(listed >= 0, order[listed], -1)
+
+    def _best(self, groups: Array, listed: int, passes: int) -> Array:
+        """int (g, GROUP, kept): the best senders, by their place in the order of the blocks."""
+        blocks, most, rest = self.blocks.candidates(groups, listed)
+        count = (most > 0.0).sum(axis=1)
+        ends = np.cumsum(count)
+        start = time.perf_counter()
+        graph = Graph(self.gpu)
+        held: dict[str, Any] = {}
+        for _ in range(passes):
+            result = graph.dispatch(
+                _MODULE,
+                size=len(groups) * self.group * self.kept,
+                params={
+                    "kept": self.kept,
+                    "first_entry": self.blocks.first,
+                    "reflectances": len(self.blocks.total),
+                    "first_reach": self.blocks.first_reach,
+                },
+                tables=self.tables,
+                vertices=self.vertices,
+                blocks=self.buffer,
+                lists={"group": groups, "first": ends - count, "end": ends},
+                candidates={"block": blocks[most > 0.0], "most": most[most > 0.0]},
+                **held,
+            )
+            held = vars(result)
+        graph.run(result.cursors, result.entries)
+        entries = graph.read(result.entries).reshape(len(groups), self.group, self.kept)
+        cursors = graph.read(result.cursors)[: len(groups) * self.lanes].reshape(len(groups), self.lanes)
+        rate = len(groups) / (time.perf_counter() - start)
+        self.rate = float(np.clip(rate, self.rate / 2, self.rate * 4))
+        found = np.where(entries["share"] > 0.0, entries["sender"].astype(np.int64), -1)
+        is_there = np.arange(self.group) < np.diff(self.blocks.edges)[groups, None]
+        least = np.where(is_there, entries["share"][:, :, -1], np.inf).min(axis=1)
+        halted = ((cursors < self.group * count[:, None]) & is_there[:, :: self.group // self.lanes]).any(axis=1)
+        short = rest > least
+        if halted.any():
+            found[halted] = self._best(groups[halted], listed, 2 * passes)
+        short &= ~halted
+        if short.any():
+            found[short] = self._best(groups[short], 4 * listed, passes)
+        return found
