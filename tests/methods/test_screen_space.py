@@ -28,14 +28,17 @@ SLANTED = DirectionalLight((0, -1, -1), (2**0.5,) * 3)
 ABOVE = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=16)
 
 
-def shade() -> Object:
+def shade(height: float = 40.0) -> Object:
     """Keeps SLANTED off the half x < 0 of the floor."""
     half = Mesh(plane(side=50.0).positions - np.float32([25, 0, 0]), plane().faces)
-    return Object(half, MATTE, translate=(0, 40, 40))
+    return Object(half, MATTE, translate=(0, height, 40))
 
 
-def floor(material, camera, mesh=None):
-    return lit(SLANTED, mesh=mesh or plane(side=60.0, cells=4), material=material, camera=camera, extra=(shade(),))
+def floor(camera):
+    """Of skin, as high as the camera's target."""
+    height = camera.target[1]
+    level = plane(side=60.0, y=height, cells=4)
+    return lit(SLANTED, mesh=level, material=SKIN, camera=camera, extra=(shade(40 + height),))
 
 
 def M_of(gpu, scene, method, size):
@@ -57,7 +60,7 @@ def places(gpu, scene, size):
 def edge_error(gpu, camera, method, size=128):
     """Largest difference (3,) from the edge's true response, of the profile's total, within 8 mm of the middle and away
     from the image's border."""
-    scene = floor(SKIN, camera)
+    scene = floor(camera)
     x, seen = places(gpu, scene, size)
     error = np.abs(M_of(gpu, scene, method, size) - SKIN_GAUSSIANS.step_response(x[..., 0])) / SKIN_GAUSSIANS.total
     inner = (seen == 1) & (np.abs(x[..., [0, 2]]) < 8).all(axis=2)
@@ -108,9 +111,10 @@ def test_passes_stay_at_right_angles_on_a_surface_slanted_both_ways(gpu):
     assert edge_error(gpu, camera, ScreenSpace(taps=33)).max() < 0.012
 
 
-def test_edge_seen_in_perspective(gpu):
-    """Near and far of a slanted floor, millimetres span 5 to 11 pixels."""
-    camera = PerspectiveCamera((0, 30, -20), (0, 0, 0), up=(0, 0, 1), fov=25)
+@pytest.mark.parametrize("side", [1, -1])
+def test_edge_seen_in_perspective(gpu, side):
+    """Away from the camera millimetres span fewer pixels, and fewer still for the slope: 8 to 5 in the middle half."""
+    camera = PerspectiveCamera((25.0 * side, 125, 0), (0, 100, 0), up=(0, 0, side), fov=25)
     assert edge_error(gpu, camera, ScreenSpace(taps=33)).max() < 0.03
 
 
@@ -166,6 +170,18 @@ def test_bends_let_light_through(gpu):
     np.testing.assert_allclose(M[64], WIDE.gaussians.step_response(-x), atol=0.02)
 
 
+def test_bent_surfaces_let_light_through(gpu):
+    """Over a cylinder of 6 mm, as far as 50 degrees from the top, light goes by the length of the arc."""
+    flat, material = painted(plane(side=20.0, cells=64), 255, 0)
+    angle = np.clip(flat.positions[:, 0] / 6, -1.6, 1.6)
+    bent = np.stack([6 * np.sin(angle), 6 * np.cos(angle) - 6, flat.positions[:, 2]], axis=1)
+    scene = lit(EnvironmentLight((1, 1, 1)), mesh=flat.deformed(bent), material=material, camera=ABOVE)
+    M = M_of(gpu, scene, ScreenSpace(taps=33), 128)[64]
+    arc = 6 * np.arcsin(np.clip((np.arange(128) - 63.5) / 48, -1, 1))
+    near = np.abs(arc) < 5.2
+    np.testing.assert_allclose(M[near] / np.pi, WIDE.gaussians.step_response(-arc[near]), atol=0.022)
+
+
 def test_bodies_keep_their_light_and_their_kernels(gpu):
     """Two floors side by side, of different materials, under one edge that crosses both."""
     t = plane(side=60.0, cells=2)
@@ -217,6 +233,12 @@ def test_taps(count):
     )
     np.testing.assert_allclose(taps.weight[0], np.eye(1 + count // 2)[:, :1] @ np.ones((1, 3)), atol=1e-6)
     assert (np.abs(taps.pixels_per_mm[1:] / taps.pixels_per_mm[:-1] - 1) < 0.022).all()
+
+
+def test_taps_of_a_black_material():
+    (term,) = line_spread(SumOfGaussians(np.array([0.5]), np.zeros((1, 3))))
+    taps = Taps(term, term, 8)
+    assert np.isfinite(taps.weight).all() and np.isfinite(taps.offset).all() and (taps.scale == 0).all()
 
 
 def test_knobs():

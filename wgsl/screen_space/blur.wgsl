@@ -1,4 +1,4 @@
-// One direction of a separable blur over the surface of one object, as it is seen (Jimenez et al. 2015, section 5).
+// One direction of a separable blur over the surface of one object, as it is seen (Jimenez et al. 2015, Separable Subsurface Scattering).
 //
 // The first direction runs along the rows of the image, the second at right angles to it on the surface, whatever way
 // that faces. Weights are of whole pixels, by how many of them a millimetre of the surface spans there.
