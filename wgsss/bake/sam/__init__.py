@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.sam.blocks import Blocks
+from wgsss.bake.sam.coarse import select_coarse
 from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.parts import Fans
-from wgsss.bake.sam.top import select_top
+from wgsss.bake.sam.soundness import concerns
+from wgsss.bake.sam.top import best, select_top
 from wgsss.bake.sam.tree import tree
 from wgsss.errors import InputError, unknown
 from wgsss.gpu import Gpu
@@ -22,18 +25,27 @@ from wgsss.scene.mesh import Mesh
 
 __all__ = ["SELECTIONS", "Entries", "spatial_adjacency_map"]
 
-SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {"top": select_top}
+SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {
+    "top": select_top,
+    "coarse": select_coarse,
+}
 """Ways to choose the senders, by name."""
 
 MOST_BYTES = 1 << 30
 """of the entries of a map"""
 _PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
-_FANS = (Entries, fan_areas, Fans, FormFactors, "sam/form_factors")
-_CODE: dict[str, tuple[Any, ...]] = {"top": (*_FANS, Blocks, tree, "sam/top")}
+_TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, tree, best, "sam/form_factors", "sam/top")
+_CODE: dict[str, tuple[Any, ...]] = {
+    "top": _TOP,
+    "coarse": _TOP,
+}
+"""What each selection depends on, beside the module that it is in."""
 
 
 def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, select: str) -> Entries:
     """The map of a mesh with `samples` entries for each vertex, chosen as `select` says; cached.
+
+    Warns of what makes front and back sides (000 eq. 13, 14) mean less than they should: see `concerns`.
 
     Raises InputError for a selection that is not there, fewer than one sample, and a map of more than MOST_BYTES.
     """
@@ -49,8 +61,11 @@ def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, 
         )
 
     def make() -> Arrays:
-        return SELECTIONS[select](gpu, mesh, profile, samples).arrays()
+        note = concerns(mesh)
+        return {**SELECTIONS[select](gpu, mesh, profile, samples).arrays(), "note": np.array(note)}
 
     key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), samples, select]
-    found = cached("sam", [*key, gpu.name], make, code=(SELECTIONS[select], *_CODE[select]))
+    found = cached("sam", [*key, gpu.name], make, code=(SELECTIONS[select], concerns, *_CODE[select]))
+    if note := str(found["note"]):
+        warnings.warn(f"{mesh.name}: {note}", stacklevel=2)
     return Entries.of(found)

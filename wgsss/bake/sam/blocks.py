@@ -22,28 +22,33 @@ _NORMALS = 8.0  # spacings of the vertices, about a block's width: how far apart
 class Blocks:
     """The vertices of a mesh that have a fan, in blocks, as `wgsl/sam/top.wgsl` reads them.
 
-    `reach` is in mm: beyond, nothing is sent.
+    `reach` is in mm: beyond, nothing is sent. Where `sending` (V,) is given, only those vertices send, and only the
+    others receive.
     """
 
-    def __init__(self, mesh: Mesh, fans: Fans, R: Reflectance, reach: float) -> None:
+    def __init__(self, mesh: Mesh, fans: Fans, R: Reflectance, reach: float, sending: Array | None = None) -> None:
         module = wgsl.load(_MODULE)
-        alive = np.flatnonzero(fans.area > 0.0)
-        spacing = np.sqrt(fans.area.sum() / max(len(alive), 1))
-        where = np.column_stack([fans.centre, _NORMALS * spacing * fans.normal])[alive]
-        parts = 1
-        while parts * module.constants["GROUP"] < len(alive):
-            parts *= 2
-        self.order = alive[tree(where).order] if len(alive) else alive
+        sending = np.ones(len(fans.area), bool) if sending is None else sending
+        order, edges = _blocks(fans, (fans.area > 0.0) & sending, module.constants["GROUP"])
+        self.senders = len(edges)
+        """the first blocks, which send"""
+        self.receivers = slice(0, self.senders)
+        """the blocks that receive: the same, or where not all vertices send, those of the others"""
+        if not sending.all():
+            others, more = _blocks(fans, (fans.area > 0.0) & ~sending, module.constants["GROUP"])
+            self.receivers = slice(len(edges), len(edges) + len(more))
+            order, edges = np.concatenate([order, others]), np.concatenate([edges, len(order) + more])
+        self.order = order
         """int (N,): the vertices in the order of the blocks"""
-        self.edges = len(alive) * np.arange(parts + 1) // parts
+        self.edges = np.append(edges, len(order))
         """int (B + 1,): where blocks begin in it"""
-        o = self.order
+        o, parts = self.order, len(edges)
         vertex = {"position": mesh.positions, "area": fans.area, "normal": mesh.normals, "extent": fans.extent}
         vertex = {name: values[o] for name, values in (*vertex.items(), ("centre", fans.centre))}
         self.vertices = module.layout("array<Vertex>").pack(vertex)
 
         def each(how: Any, values: Array) -> Array:
-            return how.reduceat(values[o], self.edges[:-1], axis=0)
+            return how.reduceat(values[o], self.edges[:-1], axis=0) if parts else values[o]
 
         self.area = each(np.maximum, fans.area).astype(np.float32)
         self.ranges = module.layout("array<Block>").pack(
@@ -52,10 +57,11 @@ class Blocks:
         self._low, self._high = (each(how, fans.centre).astype(np.float32) for how in (np.minimum, np.maximum))
         self._extent = each(np.minimum, fans.extent).astype(np.float32)
         mean = each(np.add, fans.normal)
-        self._axis = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-30)
+        self._axis = (mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-30)).astype(np.float32)
         which = np.repeat(np.arange(parts), np.diff(self.edges))
         apart = np.einsum("nk,nk->n", fans.normal[o], self._axis[which])
-        self._cone = np.arccos(np.clip(np.minimum.reduceat(apart, self.edges[:-1]) - 1e-6, -1.0, 1.0))
+        cosine = np.minimum.reduceat(apart, self.edges[:-1]) if parts else apart
+        self._cone = np.arccos(np.clip(cosine - 1e-6, -1.0, 1.0)).astype(np.float32)
 
         end = np.searchsorted(R.squares, reach * reach)
         total = R.R[: max(end, 1), :3].astype(np.float64).sum(axis=1)
@@ -87,18 +93,30 @@ class Blocks:
         return ahead, np.take_along_axis(most, ahead, axis=1), rest
 
     def _bound(self, groups: Array) -> Array:
-        """float32 (g, B): what a vertex of a block sends to one of a group at most, of all channels together."""
-        square = self._extent[groups, None] + self._extent
-        for axis in range(3):
-            gap = np.maximum(
-                self._low[:, axis] - self._high[groups, axis, None], self._low[groups, axis, None] - self._high[:, axis]
-            )
+        """float32 (g, senders): what a vertex of a block sends to one of a group at most, of all channels together."""
+        s = slice(0, self.senders)
+        square = self._extent[groups, None] + self._extent[s]
+        for low, high in zip(self._low.T, self._high.T, strict=True):
+            gap = np.maximum(low[s] - high[groups, None], low[groups, None] - high[s])
             np.maximum(gap, 0.0, out=gap)
             square += np.square(gap, out=gap)
         entry = np.maximum(square.view(np.uint32) >> np.uint32(shift()), np.uint32(self.first)) - np.uint32(self.first)
-        most = self._most[np.minimum(entry, np.uint32(len(self._most) - 1))] * self.area
+        most = self._most[np.minimum(entry, np.uint32(len(self._most) - 1))] * self.area[s]
         # Normals of the two may be at a right angle, or more, if the axes are within both cones of it.
-        cosine = self._axis[groups].astype(np.float32) @ self._axis.T.astype(np.float32)
-        cone = self._cone[groups, None] + self._cone
+        cosine = self._axis[groups] @ self._axis[s].T
+        cone = self._cone[groups, None] + self._cone[s]
         most[cosine > np.sin(np.minimum(cone, 0.5 * np.pi)) + 1e-5] = 0.0
         return most
+
+
+def _blocks(fans: Fans, which: Array, size: int) -> tuple[Array, Array]:
+    """Vertices in blocks of `size` at most, and where each block begins."""
+    chosen = np.flatnonzero(which)
+    if not len(chosen):
+        return chosen, chosen
+    spacing = np.sqrt(fans.area[chosen].mean())
+    order = tree(np.column_stack([fans.centre, _NORMALS * spacing * fans.normal])[chosen]).order
+    parts = 1
+    while parts * size < len(chosen):
+        parts *= 2
+    return chosen[order], len(chosen) * np.arange(parts) // parts

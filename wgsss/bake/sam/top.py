@@ -13,7 +13,7 @@ import numpy.typing as npt
 from wgsss import wgsl
 from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.entries import Entries, empty
-from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.sam.form_factors import MOST, FormFactors
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
@@ -32,54 +32,61 @@ _SLOTS = 1 << 21  # of entries at once: a dispatch has 65,535 workgroups at most
 
 
 def select_top(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
-    """The n vertices of largest K_oi (000 eq. 11), all channels together, on each vertex' back side (eq. 13, 14).
+    """The n vertices of largest K_oi (000 eq. 11), all channels together, on each vertex' back side (eq. 13, 14)."""
+    return Entries(*best(gpu, mesh, profile, n), len(mesh.positions))
 
-    Those that come nearest to it by their fans' areas and mean squared distances are integrated, and more than n, so
-    that the best of them are by the integral. Beyond the distance from where a share BEYOND of the light of a plane
-    comes, nothing is looked for.
+
+def best(gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None = None) -> tuple[Array, Array]:
+    """Senders (V, n) and form factors (V, n, 3) of the n largest K_oi, the largest first; -1 where there are no more.
+
+    Of more than n that come nearest to it by their fans' areas and mean squared distances, the n best by points of low
+    order are integrated. Beyond the distance from where a share BEYOND of the light of a plane comes, nothing is
+    looked for. Where `sending` (V,) is given, only those vertices send, and only the others receive.
     """
-    sender, weight = empty(len(mesh.positions), n)
-    factors = FormFactors(gpu, mesh, profile)
-    search = Search(gpu, mesh, profile, factors, n + 5 + n // 2)
     from tqdm import tqdm
 
-    shown = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
+    sender, weight = empty(len(mesh.positions), n)
+    factors = FormFactors(gpu, mesh, profile)
+    search = Search(gpu, mesh, profile, factors, n + 5 + n // 2, sending)
+    shown: dict[str, Any] = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
     with tqdm(total=len(mesh.positions), file=sys.stderr, disable=None, **shown) as bar:
         for receivers, found in search:
-            rows, columns = np.nonzero(found >= 0)
-            pairs = np.stack([receivers[rows], found[rows, columns]], axis=1)
-            rough = np.zeros(found.shape)
-            rough[rows, columns] = factors.of(pairs, most=1).sum(axis=1)
-            best = np.argsort(-rough, axis=1, kind="stable")[:, :n]
-            chosen = np.take_along_axis(found, best, axis=1)
-            rows, columns = np.nonzero(chosen >= 0)
-            K = np.zeros((*chosen.shape, 3), np.float32)
-            K[rows, columns] = factors.of(np.stack([receivers[rows], chosen[rows, columns]], axis=1))
+            rough = _factors(factors, receivers, found, most=1).sum(axis=2)
+            found = np.take_along_axis(found, np.argsort(-rough, axis=1, kind="stable")[:, :n], axis=1)
+            K = _factors(factors, receivers, found, most=MOST)
             order = np.argsort(-K.sum(axis=2), axis=1, kind="stable")
-            sender[receivers], weight[receivers] = (
-                np.take_along_axis(chosen, order, axis=1),
-                np.take_along_axis(K, order[..., None], axis=1),
-            )
+            sender[receivers] = np.take_along_axis(found, order, axis=1)
+            weight[receivers] = np.take_along_axis(K, order[..., None], axis=1)
             bar.update(len(receivers))
-    return Entries(sender, weight, len(mesh.positions))
+    return sender, weight
+
+
+def _factors(factors: FormFactors, receivers: Array, found: Array, most: int) -> Array:
+    """K (R, k, 3) of receivers (R,) and what is found for each (R, k)."""
+    rows, columns = np.nonzero(found >= 0)
+    K = np.zeros((*found.shape, 3), np.float32)
+    K[rows, columns] = factors.of(np.stack([receivers[rows], found[rows, columns]], axis=1), most)
+    return K
 
 
 class Search:
     """Goes over the vertices of a mesh, some at a time, with the `kept` best senders of each: by the area of their fans
     and R_d at the root of the mean squared distance between them. -1 where there are no more."""
 
-    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile, factors: FormFactors, kept: int) -> None:
+    def __init__(
+        self, gpu: Gpu, mesh: Mesh, profile: Profile, factors: FormFactors, kept: int, sending: Array | None = None
+    ) -> None:
         self.gpu, self.kept, self.rate = gpu, kept, _FIRST_RATE
         constants = wgsl.load(_MODULE).constants
         self.group, self.lanes = constants["GROUP"], constants["GROUP"] // constants["FOUR"]
-        self.blocks = Blocks(mesh, factors.fans, factors.R, float(profile.range(BEYOND).max()))
+        self.blocks = Blocks(mesh, factors.fans, factors.R, float(profile.range(BEYOND).max()), sending)
         self.tables = gpu.buffer(np.concatenate([self.blocks.total, self.blocks.reach]))
         self.vertices, self.buffer = gpu.buffer(self.blocks.vertices), gpu.buffer(self.blocks.ranges)
 
     def __iter__(self) -> Iterator[tuple[Array, Array]]:
         order, edges = self.blocks.order, self.blocks.edges
-        first, end = 0, len(edges) - 1 if len(order) else 0
-        most = min(max(_CHUNK // max(end, 1), 1), _SLOTS // (self.group * self.kept))
+        first, end = self.blocks.receivers.start, self.blocks.receivers.stop
+        most = min(max(_CHUNK // max(self.blocks.senders, 1), 1), _SLOTS // (self.group * self.kept))
         while first < end:
             groups = np.arange(first, min(first + int(np.clip(self.rate * _SUBMISSION, 1, most)), end))
             found = self._best(groups, _LISTED, 1 + self.kept // 8)
