@@ -16,8 +16,16 @@ from wgsss.methods.screen_space import ScreenSpace, Taps, place
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.separable import line_spread
 from wgsss.rendering import Renderer
-from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, Object, OrthographicCamera, PerspectiveCamera
-from wgsss.scene.shapes import sphere
+from wgsss.scene import (
+    DirectionalLight,
+    EnvironmentLight,
+    Mesh,
+    Object,
+    OrthographicCamera,
+    PerspectiveCamera,
+)
+from wgsss.scene.motion import BendAndSwell
+from wgsss.scene.shapes import capsule, sphere
 from wgsss.stage import Stage
 
 SKIN = replace(MATTE, gaussians=SKIN_GAUSSIANS)
@@ -135,6 +143,22 @@ def test_uniform_light_on_a_sphere(gpu, monkeypatch):
     on = places(gpu, scene, 96)[1] == 1
     np.testing.assert_allclose(M[on], np.pi, rtol=1e-3)
     assert (M[~on] == 0).all()
+
+
+def test_every_pixel_of_what_moves_and_of_what_surrounds_the_camera(gpu):
+    """The passes are drawn over rectangles: those of an object as posed, and the whole picture where some of it lies
+    behind the camera."""
+    light = EnvironmentLight((1, 1, 1))
+    motion = BendAndSwell(length=20.0, period_s=1.0)
+    finger = Object(
+        capsule(length=20.0, radius=2.0, vertices=500), SKIN, motion=BendAndSwell(length=20.0, period_s=1.0)
+    )
+    aside = OrthographicCamera((0, 10, 50), (0, 10, 0), height=40)
+    amid = PerspectiveCamera((0, 2, 0), (0, 0, -3), fov=90)
+    for scene, time in ((replace(lit(light, camera=aside), objects=(finger,)), 0.25), (lit(light, camera=amid), 0.0)):
+        image = Renderer(scene, ScreenSpace(), (64, 64), gpu).frame(time, aovs=["M_front"], timed=False)
+        seen = image.pixels[..., 3] > 0
+        assert seen.sum() > 50 and (image.aovs["M_front"][seen] > 0).all()
 
 
 def painted(mesh: Mesh, left: int, right: int, material=WIDE):

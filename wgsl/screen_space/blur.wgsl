@@ -5,11 +5,12 @@
 
 import package::units::{Length, Number, Position};
 import package::mesh::{Surface, color_after};
-import package::screen::{screen_corner};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
+    rectangle: vec4f, // where the object may be
     scale: vec3f,   // of what comes out of the second direction
     direction: u32, // 0 or 1
     coarsest: f32,  // pixels per mm of level 0
@@ -67,7 +68,7 @@ fn from_middle(step: vec4f, x: Position) -> vec4f {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -1,11 +1,12 @@
 // What enters one object at its pixels, and which way its surface runs there: the input of the blurs.
 
 import package::mesh::{Surface, color_before};
-import package::screen::{screen_corner};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float, RG32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -25,7 +26,7 @@ const LEAST_COSINE: f32 = 0.1; // beyond, a pixel spans ten times its width: not
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment
