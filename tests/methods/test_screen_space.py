@@ -150,9 +150,8 @@ def test_every_pixel_of_what_moves_and_of_what_surrounds_the_camera(gpu):
     behind the camera."""
     light = EnvironmentLight((1, 1, 1))
     motion = BendAndSwell(length=20.0, period_s=1.0)
-    finger = Object(
-        capsule(length=20.0, radius=2.0, vertices=500), SKIN, motion=BendAndSwell(length=20.0, period_s=1.0)
-    )
+    rod = capsule(length=20.0, radius=2.0, vertices=500)
+    finger = Object(rod, SKIN, motion=motion, translate=(8, 0, 0))
     aside = OrthographicCamera((0, 10, 50), (0, 10, 0), height=40)
     amid = PerspectiveCamera((0, 2, 0), (0, 0, -3), fov=90)
     for scene, time in ((replace(lit(light, camera=aside), objects=(finger,)), 0.25), (lit(light, camera=amid), 0.0)):
