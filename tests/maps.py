@@ -11,7 +11,7 @@ from wgsss.bake.sam import Entries
 from wgsss.bake.sam.tree import tree
 from wgsss.methods import sam
 from wgsss.methods.sam import SpatialAdjacencyMaps
-from wgsss.scene import MATERIALS, DirectionalLight, OrthographicCamera
+from wgsss.scene import MATERIALS, DirectionalLight, Mesh, OrthographicCamera
 
 MARBLE = replace(MATERIALS["marble"], specular=0.0)
 SIDE = DirectionalLight((-0.7, -0.5, -0.5), (1, 2, 3))
@@ -23,11 +23,15 @@ def rms(values: Any) -> float:
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def random_entries(mesh, samples=5, *, nodes=True):
+def random_entries(mesh: Mesh, samples: int = 5, *, few: bool = False) -> Entries:
+    """Weights of vertices and nodes: of any, or of few, which few vertices have."""
     random = np.random.default_rng(4)
-    V = len(mesh.positions)
-    over = tree(mesh.positions) if nodes else None
-    sender = random.integers(-1, V + (len(over.first) if nodes else 0), (V, samples))
+    V, over = len(mesh.positions), tree(mesh.positions)
+    sender = random.integers(-1, V + len(over.first), (V, samples))
+    if few:
+        finest = V + random.integers(0, over.levels[1], (V, samples))
+        sender = np.where(random.random((V, samples)) < 0.5, sender % 7, V + finest % 11)
+        sender[random.random(V) < 0.8] = -1
     weight = random.random((V, samples, 3)) * (sender >= 0)[..., None]
     return Entries(sender.astype(np.int32), weight.astype(np.float32), V, None, over)
 

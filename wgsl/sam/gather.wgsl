@@ -6,22 +6,22 @@ import package::units::{Number};
 struct Params {
     kept: Number, // share of what M_back was that stays, 1 - alpha
     samples: u32, // entries of a vertex
-    first: u32,   // vertex that the entries begin with
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> entries: array<Entry>;
-@group(0) @binding(2) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over the nodes
-@group(0) @binding(3) var<storage, read_write> last: array<vec4f>; // M_back as it was, from frame to frame
-@group(0) @binding(4) var<storage, read_write> M_back: array<vec4f>;
+@group(0) @binding(1) var<storage, read> vertices: array<u32>; // those that have entries
+@group(0) @binding(2) var<storage, read> entries: array<Entry>;
+@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over the nodes
+@group(0) @binding(4) var<storage, read_write> last: array<vec4f>; // M_back as it was, from frame to frame
+@group(0) @binding(5) var<storage, read_write> M_back: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let first = id.x * params.samples;
-    if first >= arrayLength(&entries) {
+    if id.x >= arrayLength(&vertices) {
         return;
     }
-    let i = params.first + id.x;
+    let i = vertices[id.x];
+    let first = id.x * params.samples;
     var M = vec3f(0.0);
     for (var k = first; k < first + params.samples; k++) {
         let entry = entries[k];

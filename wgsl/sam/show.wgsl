@@ -13,6 +13,9 @@ struct Params {
 @group(0) @binding(3) var<storage, read> M_back_at: array<vec4f>; // by vertex of the welded topology
 @group(0) @binding(4) var where_seen: texture_2d<f32>;
 @group(0) @binding(5) var base_color: texture_2d<f32>;
+@group(0) @binding(6) var depth: texture_depth_2d;
+
+const SAME: f32 = 1e-5; // depths that differ by less are of one surface
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -33,8 +36,9 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 @fragment
 fn fs(in: Varying) -> Pixel {
     let texel = vec2u(in.clip.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
-        discard; // another object is in front
+    let hidden = in.clip.z > textureLoad(depth, texel, 0) + SAME;
+    if hidden || u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
     }
     return Pixel(vec4f(in.M_back * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));
 }

@@ -9,7 +9,7 @@ struct Params {
     low: Number,    // of the table: log2 of a squared distance, mm^2
     steps: Number,  // of the table, each time that squares double
     samples: u32,   // entries of a vertex
-    receivers: u32, // where those of the entries begin among the places
+    receivers: u32, // where the vertices begin among the places
     anew: u32,      // 1: from the senders at rest
     split: u32,     // 1 where senders count only from behind (eq. 13, 14)
     moves: u32,     // 1 where senders are vertices and may give way
@@ -26,7 +26,8 @@ const SLACK: Number = 1e-4;  // nor for what rounding puts behind: the best are 
 @group(0) @binding(4) var<storage, read> adjacency: array<u32>;   // where each vertex's neighbours begin, then those
 @group(0) @binding(5) var<storage, read> table: array<vec4f>;     // log2 of R_d
 @group(0) @binding(6) var<storage, read_write> moved: array<i32>; // the senders, from frame to frame
-@group(0) @binding(7) var<storage, read_write> entries: array<Entry>;
+@group(0) @binding(7) var<storage, read> vertices: array<u32>;    // those that have entries
+@group(0) @binding(8) var<storage, read_write> entries: array<Entry>;
 
 fn log_reflectance(squared: Area) -> vec3f {
     let last = arrayLength(&table) - 1u;
@@ -117,11 +118,11 @@ fn climb(e: u32, first: u32, receiver: u32) {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let first = id.x * params.samples;
-    if id.y > 0u || first >= arrayLength(&entries) {
-        return; // the size of what is dispatched is that of `entries`
+    if id.y > 0u || id.x >= arrayLength(&vertices) {
+        return; // what is dispatched has the size of `entries`
     }
-    let receiver = params.receivers + id.x;
+    let first = id.x * params.samples;
+    let receiver = params.receivers + vertices[id.x];
     if params.anew == 1u {
         for (var e = first; e < first + params.samples; e++) {
             moved[e] = at_rest[e].sender;

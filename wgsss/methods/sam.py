@@ -13,12 +13,12 @@ import numpy as np
 
 from wgsss import frame as shared
 from wgsss.bake.sam import SELECTIONS, Entries, spatial_adjacency_map
-from wgsss.bake.sam.fans import fan_areas
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
-from wgsss.methods.sam_senders import blocks, follow, over_nodes, sender_samples, upload
+from wgsss.methods.sam_motion import follow
+from wgsss.methods.sam_senders import Plan, make_plan, over_nodes
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.stage import Body, Stage
@@ -68,67 +68,57 @@ class SpatialAdjacencyMaps:
 
     def passes(self, frame: Frame) -> Diffused:
         diffused = SURFACES[self.surface]().passes(frame)
-        drawn: Any = None
+        M_back: Any = None
         for body in frame.stage.bodies:
-            if not (self.map(body).sender >= 0).any():
+            plan = self.plan(body)
+            if plan is None:
                 continue  # nothing shines through
-            drawn = frame.graph.draw(
+            M_back = frame.graph.draw(
                 "sam/show",
-                into={} if drawn is None else {"M_back": drawn.M_back},
+                into=M_back,
                 size=frame.size,
-                depth_buffer="new" if drawn is None else drawn.depth,
-                indices=body.indices,
+                indices=plan.faces,
                 params={"world_to_clip": frame.view.world_to_clip},
                 surface=body.surface,
                 vertices=body.vertices,
-                M_back_at=self.at_vertices(frame, body),
-                **frame.seen("where_seen", "base_color"),
+                M_back_at=self.at_vertices(frame, body, plan),
+                **frame.seen("where_seen", "base_color", "depth"),
             )
-        return replace(diffused, M_back=drawn and drawn.M_back)
+        return replace(diffused, M_back=M_back)
 
-    def at_vertices(self, frame: Frame, body: Body) -> Handle:
+    def plan(self, body: Body) -> Plan | None:
+        """What a frame needs of a body's map, on the device. Bodies share it, unless what it holds changes."""
+        entries, stage, mesh = self.map(body), body.stage, body.rest.mesh
+        moving = body.rest.motion is not None
+        key = ("plan", id(entries), body.index if moving else None)
+        return stage.shared(key, lambda: make_plan(stage.gpu, mesh, body.layout.faces, entries, moving=moving))
+
+    def at_vertices(self, frame: Frame, body: Body, plan: Plan) -> Handle:
         """M_back, W/m^2, at the vertices of a body's mesh, without what `color_after` leaves of the base colour."""
-        graph, stage, mesh, entries = frame.graph, body.stage, body.rest.mesh, self.map(body)
-        V, samples = entries.sender.shape
+        graph, stage = frame.graph, body.stage
+        V, samples = plan.entries.sender.shape
         last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(np.zeros((V, 4), np.float32))))
         passed = last.passed(stage.time_s)
-        placed, points = self._points(body)
-        chosen: list[Any] = stage.shared(("entries", id(entries)), lambda: upload(stage.gpu, entries))
-        area: Any = None
+        points = _points(body, plan)
+        entries, area = [block.entries for block in plan.blocks], plan.area
         if body.rest.motion is not None:
-            chosen, area = follow(graph, body, entries, points, chosen, anew=passed == 0.0)
-        nodes = 0 if entries.tree is None else len(entries.tree.first)
-        irradiance = shared.irradiance_points(frame, body, points, placed + nodes)
-        if entries.tree is not None:
-            fans = stage.shared(("fans", id(mesh)), lambda: stage.gpu.buffer(fan_areas(mesh).astype(np.float32)))
-            bindings = {"irradiance": irradiance, "area": area or fans}
-            irradiance = over_nodes(graph, body, entries, "sam/means", "irradiance", **bindings)
+            entries, area = follow(graph, body, plan, points, anew=passed == 0.0)
+        irradiance = shared.irradiance_points(frame, body, points, len(plan.points.face) + plan.nodes)
+        irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=area)
         params = {"kept": KEPT_A_SECOND**passed if passed > 0.0 else 0.0, "samples": samples}
         M_back: Any = None
-        for block, some in zip(blocks(entries), chosen, strict=True):
+        for block, of_block in zip(plan.blocks, entries, strict=True):
             M_back = graph.dispatch(
                 "sam/gather",
-                size=V if M_back is None else block.stop - block.start,
-                params={**params, "first": block.start},
-                entries=some,
+                size=V if M_back is None else block.count,
+                params=params,
+                vertices=block.vertices,
+                entries=of_block,
                 irradiance=irradiance,
                 last=last.M_back,
                 **({} if M_back is None else {"M_back": M_back}),
             )
         return M_back
-
-    def _points(self, body: Body) -> tuple[int, Any]:
-        """How many points a body's map has, and a buffer of array<Vertex> of them as posed. Of a moving body only the
-        last pose is kept."""
-        stage, mesh, entries = body.stage, body.rest.mesh, self.map(body)
-        moving = body.rest.motion is not None
-        samples = stage.shared(("senders", id(entries), moving), lambda: sender_samples(mesh, entries, moving=moving))
-        last: dict[float, Any] = stage.shared(("points", body.index, id(entries)), dict)
-        time_s = stage.time_s if moving else 0.0
-        if time_s not in last:
-            last.clear()
-            last[time_s] = body.points(samples)
-        return len(samples.face), last[time_s]
 
 
 @dataclass
@@ -144,3 +134,13 @@ class Last:
         passed = 0.0 if self.time_s is None else time_s - self.time_s
         self.time_s = time_s
         return max(passed, 0.0)
+
+
+def _points(body: Body, plan: Plan) -> Any:
+    """A buffer of array<Vertex> of what L_d is wanted at, as posed. Of a moving body only the last pose is kept."""
+    last: dict[float, Any] = body.stage.shared(("points", body.index, id(plan)), dict)
+    time_s = 0.0 if body.rest.motion is None else body.stage.time_s
+    if time_s not in last:
+        last.clear()
+        last[time_s] = body.points(plan.points)
+    return last[time_s]

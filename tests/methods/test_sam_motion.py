@@ -17,7 +17,7 @@ from wgsss.errors import InputError
 from wgsss.gpu import LIMITS
 from wgsss.graph import Graph
 from wgsss.methods import sam
-from wgsss.methods.sam_senders import places_at_rest
+from wgsss.methods.sam_motion import places_at_rest
 from wgsss.scene import MATERIALS, Object, load_scene
 from wgsss.scene.shapes import slab, sphere
 from wgsss.stage import Stage
@@ -42,7 +42,8 @@ class Followed:
     def __init__(self, stage, time_s, method=PLAIN):
         stage.pose(time_s)
         graph = Graph(stage.gpu)
-        M_back = method.at_vertices(shared.begin(graph, stage, (8, 8)), stage.bodies[0])
+        body = stage.bodies[0]
+        M_back = method.at_vertices(shared.begin(graph, stage, (8, 8)), body, method.plan(body))
         passes = {p.module.name: p for p in graph.passes}
         read = passes["sam/gather"].reads
         wanted = [M_back, read["entries"], read["irradiance"], passes["sam/update"].reads["places"]]
@@ -240,7 +241,8 @@ def test_a_map_too_large_for_a_binding_is_read_in_parts(gpu, monkeypatch, moves)
         stage = Stage(gpu, scene)
         stage.pose(0.5)
         graph = Graph(gpu)
-        M = PLAIN.at_vertices(shared.begin(graph, stage, (8, 8)), stage.bodies[0])
+        body = stage.bodies[0]
+        M = PLAIN.at_vertices(shared.begin(graph, stage, (8, 8)), body, PLAIN.plan(body))
         graph.run(M)
         return graph.read(M), len([p for p in graph.ran if p.module.name == "sam/gather"])
 
