@@ -6,12 +6,14 @@ import package::units::{Number};
 struct Params {
     kept: Number, // share of what M_back was that stays, 1 - alpha
     samples: u32, // entries of a vertex
+    senders: u32, // where nodes begin
+    means: u32,   // of nodes, unblended: they stand before those that entries read
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> vertices: array<u32>; // those that have entries
 @group(0) @binding(2) var<storage, read> entries: array<Entry>;
-@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over the nodes
+@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over nodes
 @group(0) @binding(4) var<storage, read_write> last: array<vec4f>; // M_back as it was, from frame to frame
 @group(0) @binding(5) var<storage, read_write> M_back: array<vec4f>;
 
@@ -25,7 +27,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var M = vec3f(0.0);
     for (var k = first; k < first + params.samples; k++) {
         let entry = entries[k];
-        M += entry.weight * irradiance[max(entry.sender, 0)].rgb; // where there is no sender, the weight is 0
+        let sender = u32(max(entry.sender, 0)); // where there is none, the weight is 0
+        M += entry.weight * irradiance[sender + select(0u, params.means, sender >= params.senders)].rgb;
     }
     if params.kept > 0.0 {
         M = mix(M, last[i].rgb, params.kept);

@@ -103,9 +103,20 @@ class SpatialAdjacencyMaps:
         entries, area = [block.entries for block in plan.blocks], plan.area
         if body.rest.motion is not None:
             entries, area = follow(graph, body, plan, points, anew=passed == 0.0)
-        irradiance = shared.irradiance_points(frame, body, points, len(plan.points.face) + plan.nodes)
+        senders, nodes = len(plan.points.face), plan.nodes
+        blended = 0 if plan.blends is None else nodes
+        irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended)
         irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=area)
-        params = {"kept": KEPT_A_SECOND**passed if passed > 0.0 else 0.0, "samples": samples}
+        if plan.blends is not None and plan.entries.blend is not None:
+            irradiance = graph.dispatch(
+                "sam/blends",
+                size=len(plan.entries.blend.node),
+                params={"means": senders, "blended": senders + nodes},
+                blends=plan.blends,
+                irradiance=irradiance,
+            )
+        kept = KEPT_A_SECOND**passed if passed > 0.0 else 0.0
+        params = {"kept": kept, "samples": samples, "senders": senders, "means": blended}
         M_back: Any = None
         for block, of_block in zip(plan.blocks, entries, strict=True):
             M_back = graph.dispatch(

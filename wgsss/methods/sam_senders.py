@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.sam import Entries
+from wgsss.bake.sam.blend import Blend
 from wgsss.bake.sam.entries import BYTES
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.samples import Samples
@@ -51,6 +52,8 @@ class Plan:
     """buffer of u32, where there is a tree: senders"""
     area: Any = None
     """buffer of f32, where there is a tree: of the senders' reduced fans at rest, mm^2"""
+    blends: Any = None
+    """buffer of array<Blend> (wgsl/sam/blends.wgsl), where there is a tree"""
 
     @property
     def nodes(self) -> int:
@@ -90,6 +93,7 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
         gpu.buffer(np.append(finest, len(tree.order)).astype(np.uint32)),
         gpu.buffer(np.maximum(places[tree.order], 0).astype(np.uint32)),  # what is not needed is in no mean that is
         gpu.buffer(fan_areas(mesh)[needed].astype(np.float32)),
+        None if entries.blend is None else _blends(gpu, entries.blend),
     )
 
 
@@ -112,6 +116,8 @@ def _needed(entries: Entries) -> Array:
     tree = entries.tree
     if tree is not None:
         nodes = np.unique(entries.sender[entries.sender >= entries.senders]) - entries.senders
+        if entries.blend is not None:
+            nodes = np.unique(entries.blend.node)
         edges = np.zeros(len(tree.order) + 1, np.int64)
         np.add.at(edges, tree.first[nodes], 1)
         np.add.at(edges, tree.first[nodes] + tree.count[nodes], -1)
@@ -131,6 +137,10 @@ def _blocks(gpu: Gpu, vertices: Array, sender: Array, weight: Array) -> list[Blo
         ]
         found.append(Block(len(vertices[some]), *buffers))
     return found
+
+
+def _blends(gpu: Gpu, blend: Blend) -> Any:
+    return gpu.buffer(wgsl.load("sam/blends").layout("array<Blend>").pack(vars(blend))) if len(blend.node) else None
 
 
 def over_nodes(graph: Graph, plan: Plan, module: str, over: str, **bindings: Any) -> Any:

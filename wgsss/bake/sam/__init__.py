@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 
 from wgsss.bake.cache import Arrays, KeyPart, cached
+from wgsss.bake.sam.blend import blend
 from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.coarse import select_coarse
 from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.fit import select_fit
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.parts import Fans
+from wgsss.bake.sam.pursuit import pursue
+from wgsss.bake.sam.rows import senders
 from wgsss.bake.sam.soundness import concerns
 from wgsss.bake.sam.top import best, select_top
+from wgsss.bake.sam.training import training
 from wgsss.bake.sam.tree import tree
 from wgsss.errors import InputError, unknown
 from wgsss.gpu import Gpu
@@ -28,6 +33,7 @@ __all__ = ["SELECTIONS", "Entries", "spatial_adjacency_map"]
 SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {
     "top": select_top,
     "coarse": select_coarse,
+    "fit": select_fit,
 }
 """Ways to choose the senders, by name."""
 
@@ -38,6 +44,7 @@ _TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, tree, best, "sam/form_fac
 _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,
+    "fit": (Entries, fan_areas, Fans, FormFactors, "sam/form_factors", blend, pursue, senders, training, tree),
 }
 """What each selection depends on, beside the module that it is in."""
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.cache import Arrays
+from wgsss.bake.sam.blend import Blend
 from wgsss.bake.sam.tree import Tree
 from wgsss.bake.samples import Samples
 
@@ -22,8 +23,8 @@ BYTES = 16
 class Entries:
     """M_back at each of V vertices as a sum of n products (000 eq. 12): `weight` times what `sender` receives, L_d.
 
-    A sender is a vertex, or one of `samples`; or, where there is a `tree`, the mean over a node's vertices, weighted by
-    the areas of their fans.
+    A sender is a vertex, or one of `samples`; or, where there is a `tree`, a node: the mean over the vertices below it,
+    weighted by the areas of their fans, and over the nodes beside it by `blend`.
     """
 
     sender: Array
@@ -34,6 +35,7 @@ class Entries:
     """V, or the number of samples"""
     samples: Samples | None = None
     tree: Tree | None = None
+    blend: Blend | None = None
 
     @property
     def bytes_per_vertex(self) -> int:
@@ -41,7 +43,7 @@ class Entries:
 
     def arrays(self) -> Arrays:
         """All of it by name, as the cache keeps it."""
-        parts = {"samples": self.samples, "tree": self.tree}
+        parts = {"samples": self.samples, "tree": self.tree, "blend": self.blend}
         found = {f"{part}.{name}": a for part, held in parts.items() if held for name, a in vars(held).items()}
         return {"sender": self.sender, "weight": self.weight, "senders": np.array(self.senders), **found}
 
@@ -54,7 +56,7 @@ class Entries:
             return kind(**held) if held else None
 
         samples, tree = part(Samples, "samples."), part(Tree, "tree.")
-        return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree)
+        return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree, part(Blend, "blend."))
 
 
 def empty(vertices: int, n: int) -> tuple[Array, Array]:

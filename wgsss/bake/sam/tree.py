@@ -50,12 +50,12 @@ def tree(where: Array) -> Tree:
         spread = np.add.reduceat(np.square(here - mean[part]), edges[:-1])
         along = here[np.arange(V), spread.argmax(axis=1)[part]]
         order = order[np.lexsort((along, part))]
-    edges = [_edges(V, 4**level) for level in range(depth, -1, -1)]
+    cuts = [_edges(V, 4**level) for level in range(depth, -1, -1)]
     return Tree(
         order.astype(np.int32),
-        np.cumsum([0, *(len(e) - 1 for e in edges)]).astype(np.int32),
-        np.concatenate([e[:-1] for e in edges]).astype(np.int32),
-        np.concatenate([np.diff(e) for e in edges]).astype(np.int32),
+        np.cumsum([0, *(len(e) - 1 for e in cuts)]).astype(np.int32),
+        np.concatenate([e[:-1] for e in cuts]).astype(np.int32),
+        np.concatenate([np.diff(e) for e in cuts]).astype(np.int32),
     )
 
 

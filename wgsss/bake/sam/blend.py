@@ -1,0 +1,56 @@
+"""Means over nodes of a tree that fade into their neighbours, as what scatters below a surface does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.sam.tree import Tree
+
+Array = npt.NDArray[Any]
+
+NEIGHBOURS = 9
+"""nodes of one level in a mean, itself among them"""
+WIDTH = 0.7
+"""sigma of their weights by distance, in roots of a node's area. Means that end at borders err a third more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blend:
+    """Means of nodes of a tree, each with some of those beside it."""
+
+    node: Array
+    """int32 (U, NEIGHBOURS): nodes of the tree, each mean's own first"""
+    weight: Array
+    """float32 (U, NEIGHBOURS), summing to 1; 0 where there are fewer"""
+
+    def of(self, means: Array) -> Array:
+        """(U, ...): blended means (N, ...)."""
+        return np.einsum("uk,uk...->u...", self.weight, means[self.node])
+
+    def only(self, rows: Array) -> Blend:
+        """Some of them (rows,)."""
+        return Blend(self.node[rows], self.weight[rows])
+
+
+def blend(tree: Tree, x: Array, n: Array, area: Array) -> Blend:
+    """Every node of a tree with its neighbours: `x` (N, 3) their places, `n` (N, 3) unit normals, `area` (N,).
+
+    Normals at a right angle count as far apart as 1.4 roots of the level's mean area.
+    """
+    from scipy.spatial import KDTree
+
+    node = np.repeat(np.arange(len(area), dtype=np.int32)[:, None], NEIGHBOURS, axis=1)
+    weight = np.zeros((len(area), NEIGHBOURS), np.float32)
+    for a, b in pairwise(tree.levels):
+        width = max(float(np.sqrt(area[a:b].mean())), 1e-30)
+        place = np.concatenate([x[a:b] / width, n[a:b]], axis=1)
+        k = min(NEIGHBOURS, b - a)
+        away, near = KDTree(place).query(place, k=np.arange(1, k + 1))
+        node[a:b, :k] = a + near
+        weight[a:b, :k] = np.exp(-np.square(away) / (2.0 * WIDTH**2)) * np.maximum(area[a:b], 1e-30)[near]
+    return Blend(node, weight / weight.sum(axis=1, keepdims=True))

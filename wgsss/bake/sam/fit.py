@@ -1,0 +1,122 @@
+"""`fit`: of all that reaches a vertex from behind, the few means by which its M_back is told best, whatever shines.
+
+What an entry may read is the irradiance at a vertex, or the mean over a node of a tree. Each vertex's exact response to
+a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from multiprocessing.pool import ThreadPool
+
+import numpy as np
+
+from wgsss.bake.sam.blend import blend
+from wgsss.bake.sam.entries import Entries
+from wgsss.bake.sam.pursuit import pursue
+from wgsss.bake.sam.rows import Array, FormFactors, Senders, reaching, senders
+from wgsss.bake.sam.training import training
+from wgsss.gpu import Gpu
+from wgsss.optics import Profile
+from wgsss.scene.mesh import Mesh
+
+DRAWS = 48
+"""equal shares of a vertex's form factors: what holds the middle of one is a candidate, as are all nodes above it"""
+PATCH = 1
+"""level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
+_BLOCK = 16_000_000  # numbers that a batch of patches holds at a time, about
+
+
+def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
+    """The `n` senders of each vertex, and their weights, whose sum is nearest to its response to `training`."""
+    from threadpoolctl import threadpool_limits
+    from tqdm import tqdm
+
+    V = len(mesh.positions)
+    K = FormFactors(gpu, mesh, profile)
+    s = senders(mesh, float(profile.range(0.01).max()))
+    nodes = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
+    lights = training(mesh).T
+    means = s.tree.sums(lights * s.area[:V, None]) / _positive(s.area[V:, None])
+    light = np.concatenate([lights, nodes.of(means.astype(np.float32)), np.zeros_like(lights[:1])])
+    own = np.concatenate([lights, means.astype(np.float32), np.zeros_like(lights[:1])])
+    sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
+
+    def fit(batch: tuple[Array, Array]) -> int:
+        vertices, reached = batch
+        k = K(s, vertices[:, :, None], reached[:, None]) * (reached >= 0)[:, None, :, None]
+        candidates = _candidates(s, k, reached)
+        B, P, C, _ = k.shape
+        response = k.transpose(0, 1, 3, 2).reshape(B, 3 * P, C) @ own[reached]
+        seen = light[candidates]
+        moment = (seen @ response.transpose(0, 2, 1)).reshape(B, -1, P, 3).transpose(0, 2, 1, 3)
+        chosen, w = pursue(seen @ seen.transpose(0, 2, 1), moment, n)
+        there = vertices >= 0
+        found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
+        sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
+        return int(there.sum())
+
+    # Threads of ours: products of many small matrices are no work for those of a BLAS.
+    threads = os.cpu_count() or 1
+    with (
+        tqdm(total=V, desc=f"fitting {n} senders", unit=" vertices", file=sys.stderr, disable=None) as bar,
+        threadpool_limits(1, "blas"),
+        ThreadPool(threads) as pool,
+    ):
+        for done in pool.imap_unordered(fit, _batches(s, K, light.shape[1])):
+            bar.update(done)
+    sender[~weight.any(axis=2)] = -1
+    read = np.unique(sender[sender >= V]) - V
+    return Entries(sender, weight, V, tree=s.tree, blend=nodes.only(read))
+
+
+def _batches(s: Senders, K: FormFactors, lights: int) -> Iterator[tuple[Array, Array]]:
+    """Patches, those last that much reaches: their vertices (B, P) and what reaches them (B, C); -1 fills up."""
+    made, V = s.tree, len(s.tree.order)
+    level = min(PATCH, len(made.levels) - 2)
+    patches = np.arange(made.levels[level], made.levels[level + 1])
+    patch, reached = reaching(s, K, V + patches)
+    first, count = made.first[patches], made.count[patches]
+    start = np.searchsorted(patch, np.arange(len(patches) + 1))
+    size = np.diff(start)
+    order = np.argsort(size, kind="stable")
+    order = order[size[order] > 0]
+    P = int(count.max())
+    i = 0
+    while i < len(order):
+        j = i + 1
+        while j < len(order) and (j + 1 - i) * size[order[j]] * (lights + 12 * P) < _BLOCK:
+            j += 1
+        here = order[i:j]
+        yield _ranges(made.order, first[here], count[here]), _ranges(reached, start[here], size[here])
+        i = j
+
+
+def _ranges(values: Array, first: Array, count: Array) -> Array:
+    """Ranges of values side by side (B, longest), -1 beyond their ends."""
+    at = np.arange(count.max())
+    inside = at < count[:, None]
+    return np.where(inside, values[np.where(inside, first[:, None] + at, 0)], -1)
+
+
+def _candidates(s: Senders, k: Array, reached: Array) -> Array:
+    """Senders (B, candidates) by form factors k (B, P, C, 3) of what reaches the patches (B, C); -1 fills up."""
+    share = (k / _positive(k.sum(axis=2, keepdims=True))).mean(axis=3)
+    drawn = np.diff(np.floor(np.cumsum(share, axis=2) * DRAWS + 0.5), axis=2, prepend=0.0) > 0.0
+    patch, column = np.nonzero(drawn.any(axis=1))
+    sender, all_ = reached[patch, column], len(s.area)
+    keys = [patch * all_ + sender]
+    while len(patch):
+        above = s.parent[sender]
+        key = np.unique((patch * all_ + above)[above >= 0])
+        patch, sender = key // all_, key % all_
+        keys.append(key)
+    patch, sender = np.divmod(np.unique(np.concatenate(keys)), all_)
+    start = np.searchsorted(patch, np.arange(len(k) + 1))
+    return _ranges(sender, start[:-1], np.diff(start))
+
+
+def _positive(values: Array) -> Array:
+    return np.where(values > 0.0, values, 1.0)
