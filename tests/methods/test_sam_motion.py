@@ -153,10 +153,12 @@ def test_senders_that_are_no_vertices_follow_their_faces(gpu, monkeypatch):
         d = np.linalg.norm(between, axis=2)
         height, facing = (np.einsum("vnd,vd->vn", v, mesh.normals) for v in (between, n[entries.sender]))
         back = (height < 0) & (facing < 0)
-        clear = (np.abs(height) > 1e-4) & (np.abs(facing) > 1e-4)
+        clear = (np.abs(height) > 1e-3) & (np.abs(facing) > 1e-3)
+        same = clear & (found.sender == entries.sender)  # others have found what is better, or is behind at all
+        assert (same & back).sum() > 80
         grown = size**2 * profile.reflectance(size * d) / profile.reflectance(d) * back[..., None]
-        np.testing.assert_allclose((found.weight)[clear], (entries.weight * grown)[clear], rtol=2e-3, atol=1e-9)
-        expected = np.einsum("vnc,vnc->vc", found.weight, found.irradiance[entries.sender])
+        np.testing.assert_allclose(found.weight[same], (entries.weight * grown)[same], rtol=2e-3, atol=1e-9)
+        expected = np.einsum("vnc,vnc->vc", found.weight, found.irradiance[found.sender])
         np.testing.assert_allclose(found.M, expected, rtol=1e-4, atol=1e-9)
 
 

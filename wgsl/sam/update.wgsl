@@ -12,7 +12,8 @@ struct Params {
     receivers: u32, // where the vertices begin among the places
     anew: u32,      // 1: from the senders at rest
     split: u32,     // 1 where senders count only from behind (eq. 13, 14)
-    moves: u32,     // 1 where senders are vertices and may give way
+    even: u32,      // 1 where senders stand for equal areas, those of places being their faces'
+    moves: u32,     // 1 where senders may give way
 }
 
 const MOST_MOVES: u32 = 8u;  // of an entry in a frame
@@ -36,10 +37,14 @@ fn log_reflectance(squared: Area) -> vec3f {
     return mix(table[i].rgb, table[i + 1u].rgb, at - f32(i));
 }
 
-// log2 of what arrives from a place at a constant distance, its area times R_d (eq. 15).
-fn log_arriving(place: Place, receiver: Place) -> vec3f {
+// log2 of R_d at the distance of a place.
+fn log_reflected(place: Place, receiver: Place) -> vec3f {
     let between = place.position - receiver.position;
-    return log2(max(place.area, 1e-30)) + log_reflectance(dot(between, between) + place.variance);
+    return log_reflectance(dot(between, between) + place.variance);
+}
+
+fn log_ratio(area: Area, other: Area) -> Number {
+    return log2(max(area, 1e-30) / max(other, 1e-30));
 }
 
 // `slack`: how far beyond the limits of eq. 13 and 14, as a sine and a cosine.
@@ -54,12 +59,15 @@ fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
     if params.split == 1u && !is_behind(places[sender], places[receiver], slack) {
         return vec3f(0.0);
     }
-    let was = log_arriving(rest[sender], rest[receiver]);
-    var grown = log_arriving(places[sender], places[receiver]) - was;
+    let was = log_reflected(rest[sender], rest[receiver]);
+    var grown = log_ratio(places[sender].area, rest[sender].area) + log_reflected(places[sender], places[receiver]) - was;
     if sender != entry.sender {
         // At rest it had as much more as its area and distance tell; but what could be seen was less, or it would have
         // been chosen.
-        let more = was - log_arriving(rest[entry.sender], rest[receiver]);
+        var more = was - log_reflected(rest[entry.sender], rest[receiver]);
+        if params.even == 0u {
+            more += log_ratio(rest[sender].area, rest[entry.sender].area);
+        }
         grown += select(more, min(more, vec3f(0.0)), is_behind(rest[sender], rest[receiver], 0.0));
     }
     return entry.weight * exp2(grown);

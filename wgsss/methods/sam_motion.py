@@ -22,6 +22,7 @@ Array = npt.NDArray[Any]
 
 _LEAST = 1e-36  # 1/mm^2: R_d may underflow, the logarithm of its table must not
 _TABLE = 1024
+_NEIGHBOURS = 6  # of a sample
 _NEAREST, _FARTHEST = 1e-4, 4.0  # of the table, in diagonals of the mesh: 0.1 % apart or less where R_d counts
 
 
@@ -36,7 +37,7 @@ class Deforming:
     corners: Any
     """buffer of u32: points, three to a triangle"""
     adjacency: Any
-    """buffer of u32: where each vertex's neighbours begin, behind which they are"""
+    """buffer of u32: where each sender's neighbours begin, behind which they are"""
     table: Any
     """buffer of vec4f: log2 of R_d"""
     low: float
@@ -50,18 +51,33 @@ def deforming(body: Body, entries: Entries) -> Deforming:
     gpu, mesh = body.stage.gpu, body.rest.mesh
     layout = wgsl.load("sam/fans").layout("array<Place>")
     starts, corners = _triangles(mesh, entries)
-    next_to = adjacency(mesh)
-    near = next_to.start.astype(np.int64) + len(next_to.start)
     low, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
     return Deforming(
         gpu.buffer(layout.pack(places_at_rest(mesh, entries))),
         gpu.buffer(starts.astype(np.uint32)),
         gpu.buffer(corners.astype(np.uint32)),
-        gpu.buffer(np.concatenate([near, next_to.vertex]).astype(np.uint32)),
+        gpu.buffer(_neighbours(mesh, entries)),
         gpu.buffer(table.astype(np.float32)),
         low,
         steps,
     )
+
+
+def _neighbours(mesh: Mesh, entries: Entries) -> Array:
+    """uint32: where each sender's neighbours begin, and the end, then those: of a sample the nearest on its side."""
+    if entries.samples is None:
+        next_to = adjacency(mesh)
+        start, found = next_to.start, next_to.vertex
+    else:
+        from scipy.spatial import KDTree
+
+        rest = places_at_rest(mesh, entries)
+        x, n = (rest[name][: entries.senders] for name in ("position", "normal"))
+        k = min(_NEIGHBOURS + 1, len(x))
+        near = KDTree(x).query(x, k=[*range(1, k + 1)])[1]
+        beside = (near != np.arange(len(x))[:, None]) & (np.einsum("sd,skd->sk", n, n[near]) > 0.0)
+        start, found = np.append(0, np.cumsum(beside.sum(axis=1))), near[beside]
+    return np.concatenate([start + len(start), found]).astype(np.uint32)
 
 
 def log_table(profile: Profile, diagonal: float) -> tuple[float, float, Array]:
@@ -131,7 +147,8 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
         "receivers": 0 if entries.samples is None else entries.senders,
         "anew": anew,
         "split": entries.tree is None,
-        "moves": entries.tree is None and entries.samples is None,
+        "even": entries.samples is not None,
+        "moves": entries.tree is None,
     }
     bindings = {"places": places, "rest": kept.rest, "adjacency": kept.adjacency, "table": kept.table}
     found = [
