@@ -16,9 +16,9 @@ from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
-SHARE = 0.85
-"""of the light that leaves a plane within the disc that n senders cover: with 0.7 they miss much of what arrives, with
-0.95 they are too few to tell how the light changes"""
+LEFT = 0.26
+"""over the root of n: share of the light that leaves a plane outside the disc that n senders cover, 0.15 for 3. With
+twice as much they miss much of what arrives, with a third they are too few to tell how light changes over the disc"""
 _FEWEST = 100  # faces of a simplified mesh
 _NEAR = 16  # vertices of the mesh that are looked at for one that lies where a sender does
 
@@ -42,8 +42,8 @@ def select_coarse(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
 
 
 def spacing(profile: Profile, n: int) -> float:
-    """How far apart senders are, in mm, so that n of them cover the disc within which SHARE of it leaves."""
-    return float(profile.range(1.0 - SHARE).max()) * float(np.sqrt(np.pi / n))
+    """How far apart senders are, in mm, so that n of them cover the disc within which all light leaves but LEFT."""
+    return float(profile.range(LEFT / np.sqrt(n)).max()) * float(np.sqrt(np.pi / n))
 
 
 def simplified(mesh: Mesh, profile: Profile, n: int) -> Mesh:
