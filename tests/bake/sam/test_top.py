@@ -74,7 +74,7 @@ def test_groups_that_want_more_blocks_or_turns_get_them(gpu: Gpu, monkeypatch: p
     profile = material("marble").profile
     whole = select_top(gpu, SHELL, profile, 8)
     monkeypatch.setattr(module, "_LISTED", 2)
-    monkeypatch.setattr(module, "_CHUNK", 2000)
+    monkeypatch.setattr(module, "_CHUNK", 20)
     np.testing.assert_array_equal(select_top(gpu, SHELL, profile, 8).sender, whole.sender)
     search = Search(gpu, EAR, profile, FormFactors(gpu, EAR, profile), 90)
     groups = np.arange(search.blocks.receivers.stop)

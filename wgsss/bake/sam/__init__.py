@@ -11,6 +11,7 @@ import numpy as np
 from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.sam.blend import blend
 from wgsss.bake.sam.blocks import Blocks
+from wgsss.bake.sam.bounds import Bounds
 from wgsss.bake.sam.coarse import select_coarse
 from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
@@ -40,7 +41,7 @@ SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {
 MOST_BYTES = 1 << 30
 """of the entries of a map"""
 _PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
-_TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, tree, best, "sam/form_factors", "sam/top")
+_TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, Bounds, tree, best, "sam/form_factors", "sam/top")
 _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
+from wgsss.bake.sam.bounds import Bounds
 from wgsss.bake.sam.form_factors import Reflectance, shift, squares
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.tree import tree
@@ -16,6 +17,8 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 _MODULE = "sam/top"
+_ROW = 16  # blocks in a row, that are looked at together first
+_PER_ROW = 4  # of those, on average, that are worth a look
 _NORMALS = 8.0  # spacings of the vertices, about a block's width: how far apart opposite normals count as
 
 
@@ -42,26 +45,16 @@ class Blocks:
         """int (N,): the vertices in the order of the blocks"""
         self.edges = np.append(edges, len(order))
         """int (B + 1,): where blocks begin in it"""
-        o, parts = self.order, len(edges)
+        o = self.order
         vertex = {"position": mesh.positions, "area": fans.area, "normal": mesh.normals, "extent": fans.extent}
         vertex = {name: values[o] for name, values in (*vertex.items(), ("centre", fans.centre))}
         self.vertices = module.layout("array<Vertex>").pack(vertex)
 
-        def each(how: Any, values: Array) -> Array:
-            return how.reduceat(values[o], self.edges[:-1], axis=0) if parts else values[o]
-
-        self.area = each(np.maximum, fans.area).astype(np.float32)
+        self.bounds = Bounds.of(fans, o, edges)
         self.ranges = module.layout("array<Block>").pack(
-            {"first": self.edges[:-1], "end": self.edges[1:], "area": self.area}
+            {"first": edges, "end": self.edges[1:], "area": self.bounds.area}
         )
-        self._low, self._high = (each(how, fans.centre).astype(np.float32) for how in (np.minimum, np.maximum))
-        self._extent = each(np.minimum, fans.extent).astype(np.float32)
-        mean = each(np.add, fans.normal)
-        self._axis = (mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-30)).astype(np.float32)
-        which = np.repeat(np.arange(parts), np.diff(self.edges))
-        apart = np.einsum("nk,nk->n", fans.normal[o], self._axis[which])
-        cosine = np.minimum.reduceat(apart, self.edges[:-1]) if parts else apart
-        self._cone = np.arccos(np.clip(cosine - 1e-6, -1.0, 1.0)).astype(np.float32)
+        self.rows = self.bounds[: self.senders].merged(_ROW)
 
         end = np.searchsorted(R.squares, reach * reach)
         total = R.R[: max(end, 1), :3].astype(np.float64).sum(axis=1)
@@ -80,33 +73,34 @@ class Blocks:
     def candidates(self, groups: Array, listed: int) -> tuple[Array, Array, Array]:
         """For each group (g,), a block itself, the blocks that can send the most to one of it: which (g, k) they are,
         the most, 0 for none (g, k), in falling order, and the most (g,) that others can send."""
-        most = self._bound(groups)
-        listed = min(listed, most.shape[1])
-        if listed < most.shape[1]:
-            ahead = np.argpartition(-most, listed, axis=1)
-            rest = np.take_along_axis(most, ahead[:, listed : listed + 1], axis=1)[:, 0]
-            ahead = ahead[:, :listed]
-        else:
-            ahead, rest = np.broadcast_to(np.arange(listed), most.shape), np.zeros(len(groups), np.float32)
-        order = np.argsort(-np.take_along_axis(most, ahead, axis=1), axis=1, kind="stable")
-        ahead = np.take_along_axis(ahead, order, axis=1)
-        return ahead, np.take_along_axis(most, ahead, axis=1), rest
+        own = self.bounds[groups[:, None]]
+        most, rows, rest = _largest(self._most_between(own, self.rows), max(listed // _PER_ROW, 1))
+        inside = (rows[:, :, None] * _ROW + np.arange(_ROW)).reshape(len(groups), -1)
+        there = np.minimum(inside, self.senders - 1)
+        each = np.where(inside < self.senders, self._most_between(own, self.bounds[there]), np.float32(0.0))
+        most, chosen, others = _largest(each, listed)
+        return np.take_along_axis(there, chosen, axis=1), most, np.maximum(rest, others)
 
-    def _bound(self, groups: Array) -> Array:
-        """float32 (g, senders): what a vertex of a block sends to one of a group at most, of all channels together."""
-        s = slice(0, self.senders)
-        square = self._extent[groups, None] + self._extent[s]
-        for low, high in zip(self._low.T, self._high.T, strict=True):
-            gap = np.maximum(low[s] - high[groups, None], low[groups, None] - high[s])
-            np.maximum(gap, 0.0, out=gap)
-            square += np.square(gap, out=gap)
+    def _most_between(self, groups: Bounds, blocks: Bounds) -> Array:
+        """float32 (g, k): what a vertex of a block sends to one of a group at most, of all channels together."""
+        square = groups.squared(blocks)
         entry = np.maximum(square.view(np.uint32) >> np.uint32(shift()), np.uint32(self.first)) - np.uint32(self.first)
-        most = self._most[np.minimum(entry, np.uint32(len(self._most) - 1))] * self.area[s]
-        # Normals of the two may be at a right angle, or more, if the axes are within both cones of it.
-        cosine = self._axis[groups] @ self._axis[s].T
-        cone = self._cone[groups, None] + self._cone[s]
-        most[cosine > np.sin(np.minimum(cone, 0.5 * np.pi)) + 1e-5] = 0.0
+        most = self._most[np.minimum(entry, np.uint32(len(self._most) - 1))] * blocks.area
+        most *= groups.face_away(blocks)
         return most
+
+
+def _largest(values: Array, count: int) -> tuple[Array, Array, Array]:
+    """The largest (g, count) of each row, in falling order, which they are, and the largest (g,) of the others."""
+    if count < values.shape[1]:
+        which = np.argpartition(-values, count, axis=1)
+        rest = np.take_along_axis(values, which[:, count : count + 1], axis=1)[:, 0]
+        which = which[:, :count]
+    else:
+        which, rest = np.broadcast_to(np.arange(values.shape[1]), values.shape), np.zeros(len(values), values.dtype)
+    found = np.take_along_axis(values, which, axis=1)
+    order = np.argsort(-found, axis=1, kind="stable")
+    return np.take_along_axis(found, order, axis=1), np.take_along_axis(which, order, axis=1), rest
 
 
 def _blocks(fans: Fans, which: Array, size: int) -> tuple[Array, Array]:

@@ -24,10 +24,10 @@ Array = npt.NDArray[Any]
 _MODULE = "sam/top"
 BEYOND = 1e-3
 """share of the light of a plane that comes from farther away than what is looked at"""
-_LISTED = 64  # blocks that a group looks at first; four times as many each time that they are not enough
+_LISTED = 128  # blocks that a group looks at first; four times as many each time that they are not enough
 _SUBMISSION = 0.4  # seconds that a dispatch may take
 _FIRST_RATE = 1e3  # groups per second that any device manages
-_CHUNK = 1 << 22  # pairs of a group and a block at once
+_CHUNK = 1 << 11  # groups at once
 _SLOTS = 1 << 21  # of entries at once: a dispatch has 65,535 workgroups at most
 
 
@@ -86,7 +86,7 @@ class Search:
     def __iter__(self) -> Iterator[tuple[Array, Array]]:
         order, edges = self.blocks.order, self.blocks.edges
         first, end = self.blocks.receivers.start, self.blocks.receivers.stop
-        most = min(max(_CHUNK // max(self.blocks.senders, 1), 1), _SLOTS // (self.group * self.kept))
+        most = min(_CHUNK, _SLOTS // (self.group * self.kept))
         while first < end:
             groups = np.arange(first, min(first + int(np.clip(self.rate * _SUBMISSION, 1, most)), end))
             found = self._best(groups, _LISTED, 1 + self.kept // 8)
