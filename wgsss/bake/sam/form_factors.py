@@ -132,6 +132,8 @@ class FormFactors:
     def _integrated(self, pairs: Array, order: int) -> Array:
         """K (P, 3) by points of one order."""
         count = self.fans.count(order)
+        # Alike for all, since invocations that walk in step take as many turns as the longest loops of any.
+        step = max(_TURNS // int(count.max() + 1), 1)
         work = count[pairs[:, 0]] * count[pairs[:, 1]]
         K = np.zeros((len(pairs), 3))
         first = 0
@@ -140,16 +142,14 @@ class FormFactors:
             within = np.cumsum(work[ahead]) <= self.rate * _SUBMISSION
             within &= np.cumsum(count[pairs[ahead]].sum(axis=1)) <= _POINTS
             some = slice(first, first + max(int(within.sum()), 1))
-            K[some] = self._dispatch(pairs[some], self.fans.points(np.unique(pairs[some]), order))
+            K[some] = self._dispatch(pairs[some], self.fans.points(np.unique(pairs[some]), order), step)
             first = some.stop
         return K / self.fans.area[pairs[:, :1]]
 
-    def _dispatch(self, pairs: Array, points: Points) -> Array:
+    def _dispatch(self, pairs: Array, points: Points, step: int) -> Array:
         start = time.perf_counter()
         at = np.searchsorted(points.vertex, pairs)
         (o, i), (o_end, i_end) = points.start[at].T, points.start[at + 1].T
-        # Alike for all, since invocations that walk in step take as many turns as the longest loops of any.
-        step = max(_TURNS // int((i_end - i + 1).max()), 1)
         count = -(-(o_end - o) // step)
         which = np.repeat(np.arange(len(pairs)), count)
         starts = np.cumsum(count) - count
