@@ -24,7 +24,7 @@ Array = npt.NDArray[Any]
 _MODULE = "sam/top"
 BEYOND = 1e-3
 """share of the light of a plane that comes from farther away than what is looked at"""
-_LISTED = 128  # blocks that a group looks at first; four times as many each time that they are not enough
+_LISTED = 256  # blocks that a group looks at first; four times as many each time that they are not enough
 _SUBMISSION = 0.4  # seconds that a dispatch may take
 _FIRST_RATE = 1e3  # groups per second that any device manages
 _CHUNK = 1 << 11  # groups at once
