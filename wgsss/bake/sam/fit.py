@@ -26,6 +26,8 @@ DRAWS = 48
 """equal shares of a vertex's form factors: what holds the middle of one is a candidate, as are all nodes above it"""
 PATCH = 1
 """level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
+FAINTEST = 1e-3
+"""share of what a plane would give back, below which nothing shines through to a vertex"""
 _BLOCK = 16_000_000  # numbers that a batch of patches holds at a time, about
 
 
@@ -67,6 +69,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     ):
         for done in pool.imap_unordered(fit, _batches(s, K, light.shape[1])):
             bar.update(done)
+    weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
     sender[~weight.any(axis=2)] = -1
     read = np.unique(sender[sender >= V]) - V
     return Entries(sender, weight, V, tree=s.tree, blend=nodes.only(read))

@@ -115,6 +115,7 @@ class FormFactors:
         self._steps = (_ENTRIES - 1) / (-2.0 * np.log(_NEAREST))
         r = self.farthest * np.geomspace(_NEAREST, 1.0, _ENTRIES)
         self._R = profile.reflectance(r).astype(np.float32)
+        self._R[-1] = 0.0  # and beyond
         pairs = near_pairs(mesh)
         self._vertices = len(mesh.positions)
         self._pairs = pairs[:, 0] * self._vertices + pairs[:, 1]
