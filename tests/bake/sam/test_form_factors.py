@@ -104,6 +104,21 @@ def test_far_apart_a_constant_distance_will_do(gpu: Gpu) -> None:
     np.testing.assert_allclose(K.sum(axis=1), finest.sum(axis=1), rtol=0.005)
 
 
+def test_a_point_knows_how_far_what_it_stands_for_extends(gpu: Gpu) -> None:
+    """Straight across, the mean squared distance is all that counts to second order."""
+    mesh, profile = slab(size=(20.0, 20.0, 4.0), vertices=1200), material("marble").profile
+    pairs = opposite(mesh, 60)
+    straight = (np.abs(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]])[:, :2] < 1e-3).all(axis=1)
+    inner = (np.abs(mesh.positions[pairs[:, 0], :2]) < 9.0).all(axis=1)
+    pairs = pairs[straight & inner]
+    factors = FormFactors(gpu, mesh, profile)
+    distance = np.linalg.norm(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]], axis=1)
+    flat = (fan_areas(mesh)[pairs[:, 1], None] * profile.reflectance(distance)).sum(axis=1)
+    one, many = (factors._integrated(pairs, order).sum(axis=1) for order in (0, 3))
+    assert len(pairs) > 10 and (flat / many > 1.02).all()
+    np.testing.assert_allclose(one, many, rtol=0.003)
+
+
 def test_coarse_cells_over_a_short_range_want_many_points(gpu: Gpu) -> None:
     mesh, profile = slab(size=(40.0, 40.0, 1.0), vertices=100), material("skin1").profile
     pairs = opposite(mesh, 4)

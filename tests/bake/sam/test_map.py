@@ -15,7 +15,7 @@ from wgsss.bake.sam.tree import tree
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
-from wgsss.optics import Profile
+from wgsss.optics import Profile, SumOfGaussians
 from wgsss.scene import Mesh, material
 from wgsss.scene.shapes import sphere
 
@@ -65,7 +65,10 @@ def test_a_map_is_made_once_for_each_mesh_profile_and_number(
         spatial_adjacency_map(gpu, BALL, material("marble").profile, 3, select)
         spatial_adjacency_map(gpu, BALL, MILK, 2, select)
         spatial_adjacency_map(gpu, sphere(5.0, 320), MILK, 2, select)
-    assert made == [3, 3, 2, 2]
+        assert made == [3, 3, 2, 2]
+        for variance in (1.0, 2.0):  # of the same total
+            spatial_adjacency_map(gpu, BALL, SumOfGaussians(np.array([variance]), np.full((1, 3), 0.5)), 2, select)
+    assert made == [3, 3, 2, 2, 2, 2]
 
 
 def test_what_makes_a_map_is_part_of_its_key() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from wgsss.bake.sam import top as module
 from wgsss.bake.sam.form_factors import FormFactors
@@ -17,6 +18,10 @@ EAR, SHELL = ear(1000), gyroid(2000)
 PARTS = Mesh(  # a ball within a short way of another
     np.concatenate([sphere(4.0, 300).positions, sphere(3.0, 200).positions + np.float32([6.0, 4.0, 0.0])]),
     np.concatenate([sphere(4.0, 300).faces, sphere(3.0, 200).faces + len(sphere(4.0, 300).positions)]),
+)
+# Some fans a 16th of others.
+HALF = Mesh(
+    *trimesh.remesh.subdivide(*trimesh.remesh.subdivide(EAR.positions, EAR.faces, range(0, 900)), range(0, 900))
 )
 
 
@@ -50,6 +55,7 @@ def sums(mesh: Mesh, profile: Profile, receivers: np.ndarray) -> np.ndarray:
         *((EAR, "skin1", n) for n in (1, 3, 8, 50)),
         *((SHELL, "marble", n) for n in (1, 3)),
         *((PARTS, "wholemilk", n) for n in (3, 8)),
+        (HALF, "marble", 3),
         (slab(size=(10.0, 10.0, 0.5), vertices=300), "skin1", 8),
     ],
 )
@@ -72,10 +78,13 @@ def test_they_are_those_of_a_search_through_all(gpu: Gpu, mesh: Mesh, name: str,
 
 def test_groups_that_want_more_blocks_or_turns_get_them(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     profile = material("marble").profile
-    whole = select_top(gpu, SHELL, profile, 8)
+    whole = select_top(gpu, SHELL, profile, 3)
     monkeypatch.setattr(module, "_LISTED", 2)
     monkeypatch.setattr(module, "_CHUNK", 20)
-    np.testing.assert_array_equal(select_top(gpu, SHELL, profile, 8).sender, whole.sender)
+    np.testing.assert_array_equal(select_top(gpu, SHELL, profile, 3).sender, whole.sender)
+    uneven = select_top(gpu, HALF, profile, 3)
+    monkeypatch.setattr(module, "_LISTED", 10_000)
+    np.testing.assert_array_equal(select_top(gpu, HALF, profile, 3).sender, uneven.sender)
     search = Search(gpu, EAR, profile, FormFactors(gpu, EAR, profile), 90)
     groups = np.arange(search.blocks.receivers.stop)
     np.testing.assert_array_equal(search._best(groups, 64, 1), search._best(groups, 64, 64))
