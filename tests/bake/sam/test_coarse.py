@@ -26,6 +26,12 @@ def test_n_senders_cover_where_the_light_leaves() -> None:
     assert simplified(ball, SKIN, 3) is ball, "vertices that are far apart already stay"
 
 
+def test_flat_sides_are_as_evenly_covered_as_bent_ones() -> None:
+    for mesh in (slab(size=(30.0, 30.0, 2.0), vertices=6000), EAR):
+        area = fan_areas(simplified(mesh, SKIN, 3))
+        assert area.std() < 0.5 * area.mean() and area.max() < 2.5 * area.mean()
+
+
 def test_senders_lie_on_the_mesh_and_face_as_it_does(gpu: Gpu) -> None:
     found = select_coarse(gpu, EAR, SKIN, 3)
     simple, samples = simplified(EAR, SKIN, 3), found.samples

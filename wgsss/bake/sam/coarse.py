@@ -19,6 +19,7 @@ Array = npt.NDArray[Any]
 LEFT = 0.26
 """over the root of n: share of the light that leaves a plane outside the disc that n senders cover, 0.15 for 3. With
 twice as much they miss much of what arrives, with a third they are too few to tell how light changes over the disc"""
+_ROUGHNESS = 0.01  # of the spacing. Where a mesh is flat, simplifying it would leave few vertices, and those anywhere
 _FEWEST = 100  # faces of a simplified mesh
 _NEAR = 16  # vertices of the mesh that are looked at for one that lies where a sender does
 
@@ -54,7 +55,9 @@ def simplified(mesh: Mesh, profile: Profile, n: int) -> Mesh:
         return mesh
     from fast_simplification import simplify
 
-    positions, kept = simplify(mesh.positions.copy(), mesh.faces.copy(), target_count=faces)
+    off = _ROUGHNESS * spacing(profile, n) * np.random.default_rng(0).uniform(-1.0, 1.0, (len(mesh.positions), 1))
+    rough = (mesh.positions + off * mesh.normals).astype(np.float32)
+    positions, kept = simplify(rough, mesh.faces.copy(), target_count=faces)
     used, kept = np.unique(kept, return_inverse=True)
     return Mesh(positions[used], kept.reshape(-1, 3), name=mesh.name)
 
