@@ -37,6 +37,10 @@ class Entries:
     tree: Tree | None = None
     blend: Blend | None = None
 
+    @property
+    def bytes_per_vertex(self) -> int:
+        return BYTES * self.sender.shape[1]
+
     def arrays(self) -> Arrays:
         """All of it by name, as the cache keeps it."""
         parts = {"samples": self.samples, "tree": self.tree, "blend": self.blend}
