@@ -7,16 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from wgsss import frame as shared
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.tree import tree
+from wgsss.graph import Graph
 from wgsss.methods import sam
 from wgsss.methods.sam import SpatialAdjacencyMaps
+from wgsss.methods.sam_senders import at_vertices
 from wgsss.scene import MATERIALS, DirectionalLight, Mesh, OrthographicCamera
+from wgsss.stage import Stage
 
 MARBLE = replace(MATERIALS["marble"], specular=0.0)
 SIDE = DirectionalLight((-0.7, -0.5, -0.5), (1, 2, 3))
 FRONT = OrthographicCamera((0, 0, 50), (0, 0, 0), height=24)
-PLAIN = SpatialAdjacencyMaps(surface="none")
+PLAIN = SpatialAdjacencyMaps(select="top", surface="none")
 
 
 def rms(values: Any) -> float:
@@ -46,3 +50,13 @@ def given(monkeypatch, make):
 
     monkeypatch.setattr(sam, "spatial_adjacency_map", spatial_adjacency_map)
     return calls
+
+
+def light_at_vertices(stage: Stage) -> Any:
+    """L_d at all vertices of the one object."""
+    graph, body = Graph(stage.gpu), stage.bodies[0]
+    everywhere = at_vertices(body.rest.mesh)
+    V = len(everywhere.face)
+    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(everywhere), V)
+    graph.run(light)
+    return graph.read(light)[:, :3].astype(float)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from maps import FRONT, MARBLE, PLAIN, SIDE, given, random_entries, rms
+from maps import FRONT, MARBLE, PLAIN, SIDE, given, light_at_vertices, random_entries, rms
 from scenes import lit, plane
 
 from wgsss import frame as shared
@@ -17,7 +17,6 @@ from wgsss.errors import InputError
 from wgsss.graph import Graph
 from wgsss.methods import make_method, sam
 from wgsss.methods.lambert import Lambert
-from wgsss.methods.sam_senders import at_vertices as at_vertices_of
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.reference.integral import _seen, at_vertices
@@ -53,16 +52,6 @@ class Passes:
         self.irradiance = [graph.read(h) for h in read[1::2]]
         self.M_back = diffused.M_back and graph.read(diffused.M_back)
         self.ran = [p.module.name for p in graph.ran]
-
-
-def light_at_vertices(stage):
-    """L_d at all vertices of the one object."""
-    graph, body = Graph(stage.gpu), stage.bodies[0]
-    everywhere = at_vertices_of(body.rest.mesh)
-    V = len(everywhere.face)
-    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(everywhere), V)
-    graph.run(light)
-    return graph.read(light)[:, :3].astype(float)
 
 
 @pytest.mark.parametrize(("vertices", "few"), [(90, False), (300, True), (300, False), (20_000, False), (5000, True)])

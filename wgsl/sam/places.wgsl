@@ -18,11 +18,11 @@ const LEVELS: u32 = 5u;
 const LEAST: Area = 1e-20; // a node without an area is somewhere, too
 
 var<workgroup> middles: array<vec4f, WIDTH>; // position, area
-var<workgroup> variances: array<f32, WIDTH>;
+var<workgroup> turned: array<vec4f, WIDTH>;  // normal, variance
 
-fn store(level: u32, k: u32, middle: vec4f, variance: Area) {
+fn store(level: u32, k: u32, middle: vec4f, normal: vec4f) {
     if k < params.levels[level].y {
-        places[params.levels[level].x + k] = Place(middle.xyz, middle.w, vec3f(0.0), variance);
+        places[params.levels[level].x + k] = Place(middle.xyz, middle.w, normal.xyz, normal.w);
     }
 }
 
@@ -34,7 +34,7 @@ fn squared(v: Position) -> Area {
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i: u32) {
     let k = WIDTH * group.x + i;
     var middle = vec4f(0.0);
-    var variance = 0.0;
+    var normal = vec4f(0.0); // and the variance
     if k < params.levels[1].y {
         let is_finest = params.finest == 1u;
         let first = select(params.levels[0].x + 4u * k, starts[k], is_finest);
@@ -46,30 +46,31 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i:
         middle = vec4f(middle.xyz / middle.w, middle.w);
         for (var j = first; j < end; j++) {
             let place = places[select(j, order[j], is_finest)];
-            variance += max(place.area, LEAST) / middle.w * (place.variance + squared(place.position - middle.xyz));
+            let variance = place.variance + squared(place.position - middle.xyz);
+            normal += max(place.area, LEAST) / middle.w * vec4f(place.normal, variance);
         }
     }
-    store(1u, k, middle, variance);
+    store(1u, k, middle, normal);
     middles[i] = middle;
-    variances[i] = variance;
+    turned[i] = normal;
     for (var level = 2u; level <= LEVELS; level++) {
         let width = WIDTH >> (2u * level - 2u);
         workgroupBarrier();
         if i < width {
             middle = vec4f(0.0);
-            variance = 0.0;
+            normal = vec4f(0.0);
             for (var j = 4u * i; j < 4u * i + 4u; j++) {
                 middle += middles[j].w * vec4f(middles[j].xyz, 1.0);
             }
             middle = vec4f(middle.xyz / max(middle.w, LEAST), middle.w);
             for (var j = 4u * i; j < 4u * i + 4u; j++) {
-                let share = middles[j].w / max(middle.w, LEAST);
-                variance += share * (variances[j] + squared(middles[j].xyz - middle.xyz));
+                let variance = turned[j].w + squared(middles[j].xyz - middle.xyz);
+                normal += middles[j].w / max(middle.w, LEAST) * vec4f(turned[j].xyz, variance);
             }
-            store(level, width * group.x + i, middle, variance);
+            store(level, width * group.x + i, middle, normal);
         }
         workgroupBarrier();
         middles[i] = middle;
-        variances[i] = variance;
+        turned[i] = normal;
     }
 }

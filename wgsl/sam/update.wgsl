@@ -3,6 +3,7 @@
 
 import package::sam::entries::{Entry};
 import package::sam::place::{Place};
+import package::sam::profile::{log_entry};
 import package::units::{Number, Area};
 
 struct Params {
@@ -11,9 +12,7 @@ struct Params {
     samples: u32,   // entries of a vertex
     receivers: u32, // where the vertices begin among the places
     anew: u32,      // 1: from the senders at rest
-    split: u32,     // 1 where senders count only from behind (eq. 13, 14)
     even: u32,      // 1 where senders stand for equal areas, those of places being their faces'
-    moves: u32,     // 1 where senders may give way
 }
 
 const MOST_MOVES: u32 = 8u;  // of an entry in a frame
@@ -22,7 +21,7 @@ const SLACK: Number = 1e-4;  // nor for what rounding puts behind: the best are 
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> at_rest: array<Entry>;
-@group(0) @binding(2) var<storage, read> rest: array<Place>;      // of senders, nodes and receivers
+@group(0) @binding(2) var<storage, read> rest: array<Place>;      // of senders and receivers
 @group(0) @binding(3) var<storage, read> places: array<Place>;    // now
 @group(0) @binding(4) var<storage, read> adjacency: array<u32>;   // where each vertex's neighbours begin, then those
 @group(0) @binding(5) var<storage, read> table: array<vec4f>;     // log2 of R_d
@@ -30,17 +29,13 @@ const SLACK: Number = 1e-4;  // nor for what rounding puts behind: the best are 
 @group(0) @binding(7) var<storage, read> vertices: array<u32>;    // those that have entries
 @group(0) @binding(8) var<storage, read_write> entries: array<Entry>;
 
-fn log_reflectance(squared: Area) -> vec3f {
-    let last = arrayLength(&table) - 1u;
-    let at = clamp((log2(max(squared, 1e-30)) - params.low) * params.steps, 0.0, f32(last));
-    let i = min(u32(at), last - 1u);
-    return mix(table[i].rgb, table[i + 1u].rgb, at - f32(i));
-}
-
 // log2 of R_d at the distance of a place.
 fn log_reflected(place: Place, receiver: Place) -> vec3f {
     let between = place.position - receiver.position;
-    return log_reflectance(dot(between, between) + place.variance);
+    let last = arrayLength(&table) - 1u;
+    let at = log_entry(dot(between, between), params.low, params.steps, last);
+    let i = u32(at);
+    return mix(table[i].rgb, table[i + 1u].rgb, at - f32(i));
 }
 
 fn log_ratio(area: Area, other: Area) -> Number {
@@ -56,7 +51,7 @@ fn is_behind(place: Place, receiver: Place, slack: Number) -> bool {
 // The form factor from `sender`, from that of the entry at rest. In logarithms, nothing is divided by what vanishes.
 fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
     let slack = select(-SLACK, SLACK, sender == entry.sender);
-    if params.split == 1u && !is_behind(places[sender], places[receiver], slack) {
+    if !is_behind(places[sender], places[receiver], slack) {
         return vec3f(0.0);
     }
     let was = log_reflected(rest[sender], rest[receiver]);
@@ -136,18 +131,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             moved[e] = at_rest[e].sender;
         }
     }
-    if params.moves == 1u {
-        go_home(first, receiver);
-    }
+    go_home(first, receiver);
     for (var e = first; e < first + params.samples; e++) {
         let entry = at_rest[e];
         if entry.sender < 0 {
             entries[e] = entry;
             continue;
         }
-        if params.moves == 1u {
-            climb(e, first, receiver);
-        }
+        climb(e, first, receiver);
         entries[e] = Entry(form_factor(entry, moved[e], receiver), moved[e]);
     }
 }

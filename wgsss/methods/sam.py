@@ -43,7 +43,7 @@ class SpatialAdjacencyMaps:
         default=3, metadata={"unit": "", "range": (1, 256), "help": "senders of a vertex, those it has a use for"}
     )
     select: str = field(
-        default="top", metadata={"unit": "", "choices": tuple(SELECTIONS), "help": "how they are chosen"}
+        default="fit", metadata={"unit": "", "choices": tuple(SELECTIONS), "help": "how they are chosen"}
     )
     surface: str = field(
         default="texture", metadata={"unit": "", "choices": tuple(SURFACES), "help": "where M_front is estimated"}

@@ -1,5 +1,7 @@
-"""Spatial adjacency maps of meshes that deform (Maisch & Ropinski 2017, 3.4): their form factors follow areas and
-distances, and senders give way to better neighbours."""
+"""Spatial adjacency maps of meshes that deform (Maisch & Ropinski 2017, 3.4): the form factors of senders follow areas
+and distances, and senders give way to better neighbours. Where they are nodes, which stand for all that is behind a
+vertex, weights follow the sum of all its form factors.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ import numpy.typing as npt
 from wgsss import wgsl
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.fans import adjacency, fan_areas
-from wgsss.graph import Graph
-from wgsss.methods.sam_senders import Plan, over_nodes
+from wgsss.graph import Graph, Handle
+from wgsss.methods.sam_senders import Block, Plan, over_nodes
 from wgsss.optics import Profile
 from wgsss.scene import Mesh
 from wgsss.stage import Body
@@ -23,6 +25,7 @@ Array = npt.NDArray[Any]
 _LEAST = 1e-36  # 1/mm^2: R_d may underflow, the logarithm of its table must not
 _TABLE = 1024
 _NEIGHBOURS = 6  # of a sample
+_LEVELS = 16  # of wgsl/sam/totals.wgsl: 4^16 vertices
 _NEAREST, _FARTHEST = 1e-4, 4.0  # of the table, in diagonals of the mesh: 0.1 % apart or less where R_d counts
 
 
@@ -37,7 +40,7 @@ class Deforming:
     corners: Any
     """buffer of u32: points, three to a triangle"""
     adjacency: Any
-    """buffer of u32: where each sender's neighbours begin, behind which they are"""
+    """buffer of u32: where each sender's neighbours begin, behind which they are; None where there is a tree"""
     table: Any
     """buffer of vec4f: log2 of R_d"""
     low: float
@@ -56,7 +59,7 @@ def deforming(body: Body, entries: Entries) -> Deforming:
         gpu.buffer(layout.pack(places_at_rest(mesh, entries))),
         gpu.buffer(starts.astype(np.uint32)),
         gpu.buffer(corners.astype(np.uint32)),
-        gpu.buffer(_neighbours(mesh, entries)),
+        gpu.buffer(_neighbours(mesh, entries)) if entries.tree is None else None,
         gpu.buffer(table.astype(np.float32)),
         low,
         steps,
@@ -112,7 +115,8 @@ def places_at_rest(mesh: Mesh, entries: Entries) -> dict[str, Array]:
     middle = tree.sums(positions[:end] * weight[:, None]) / sums[:, None]
     square = tree.sums(np.square(positions[:end]).sum(axis=1) * weight) / sums
     variance = np.maximum(square - np.square(middle).sum(axis=1), 0.0)
-    nodes = {"position": middle, "area": sums, "normal": np.zeros_like(middle), "variance": variance}
+    normal = tree.sums(normals[:end] * weight[:, None]) / sums[:, None]
+    nodes = {"position": middle, "area": sums, "normal": normal, "variance": variance}
     return {name: np.concatenate([found[name][:end], nodes[name], found[name][end:]]) for name in found}
 
 
@@ -140,15 +144,15 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
     size = len(plan.points.face) + plan.nodes
     posed = graph.dispatch("sam/fans", size=size, points=points, starts=kept.starts, corners=kept.corners)
     places = over_nodes(graph, plan, "sam/places", "places", places=posed.places)
+    if entries.tree is not None:
+        return _grown(graph, body, plan, kept, places), posed.area
     params = {
         "low": kept.low,
         "steps": kept.steps,
         "samples": entries.sender.shape[1],
         "receivers": 0 if entries.samples is None else entries.senders,
         "anew": anew,
-        "split": entries.tree is None,
         "even": entries.samples is not None,
-        "moves": entries.tree is None,
     }
     bindings = {"places": places, "rest": kept.rest, "adjacency": kept.adjacency, "table": kept.table}
     found = [
@@ -164,3 +168,39 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
         for block in plan.blocks
     ]
     return found, posed.area
+
+
+def _grown(graph: Graph, body: Body, plan: Plan, kept: Deforming, places: Handle) -> list[Any]:
+    """The entries of a map of nodes, by block: those at rest, times what the sum of all form factors has grown by."""
+    samples = plan.entries.sender.shape[1]
+
+    def at_rest() -> list[Any]:
+        once = Graph(body.stage.gpu)
+        totals = [_totals(once, plan, block, kept, kept.rest) for block in plan.blocks]
+        once.run(*totals)
+        return [body.stage.gpu.buffer(once.read(handle)) for handle in totals]
+
+    return [
+        graph.dispatch(
+            "sam/grow",
+            size=block.count * samples,
+            params={"samples": samples},
+            at_rest=block.entries,
+            totals_at_rest=rest,
+            totals=_totals(graph, plan, block, kept, places),
+        )
+        for block, rest in zip(plan.blocks, body.stage.shared(("totals", id(plan)), at_rest), strict=True)
+    ]
+
+
+def _totals(graph: Graph, plan: Plan, block: Block, kept: Deforming, places: Any) -> Handle:
+    """A buffer of vec4f: of each vertex of a block, the sum of its form factors from behind."""
+    tree = plan.entries.tree
+    assert tree is not None
+    levels = np.zeros((_LEVELS, 4), np.uint32)
+    levels[: len(tree.levels) - 1, 0] = plan.entries.senders + tree.levels[:-1]
+    params = {"levels": levels, "top": len(tree.levels) - 2, "low": kept.low, "steps": kept.steps}
+    found: Handle = graph.dispatch(
+        "sam/totals", size=block.count, params=params, places=places, table=kept.table, vertices=block.vertices
+    )
+    return found
