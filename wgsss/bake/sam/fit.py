@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from multiprocessing.pool import ThreadPool
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 
 import numpy as np
 
@@ -65,10 +66,11 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     with (
         tqdm(total=V, desc=f"fitting {n} senders", unit=" vertices", file=sys.stderr, disable=None) as bar,
         threadpool_limits(1, "blas"),
-        ThreadPool(threads) as pool,
+        ThreadPoolExecutor(threads) as pool,
     ):
-        for done in pool.imap_unordered(fit, _batches(s, K, light.shape[1])):
-            bar.update(done)
+        batches = _batches(s, K, light.shape[1])
+        while some := list(islice(batches, threads)):
+            bar.update(sum(pool.map(fit, some)))
     weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
     sender[~weight.any(axis=2)] = -1
     read = np.unique(sender[sender >= V]) - V
@@ -98,10 +100,10 @@ def _batches(s: Senders, K: FormFactors, lights: int) -> Iterator[tuple[Array, A
 
 
 def _ranges(values: Array, first: Array, count: Array) -> Array:
-    """Ranges of values side by side (B, longest), -1 beyond their ends."""
-    at = np.arange(count.max())
+    """Ranges of values side by side (B, longest), one wide at least, -1 beyond their ends."""
+    at = np.arange(max(int(count.max()), 1))
     inside = at < count[:, None]
-    return np.where(inside, values[np.where(inside, first[:, None] + at, 0)], -1)
+    return np.append(values, -1)[np.where(inside, first[:, None] + at, -1)]
 
 
 def _candidates(s: Senders, k: Array, reached: Array) -> Array:
