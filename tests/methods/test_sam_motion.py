@@ -19,7 +19,7 @@ from wgsss.graph import Graph
 from wgsss.methods import sam
 from wgsss.methods.sam_motion import places_at_rest
 from wgsss.scene import MATERIALS, Object, load_scene
-from wgsss.scene.shapes import slab, sphere
+from wgsss.scene.shapes import ear, slab, sphere
 from wgsss.stage import Stage
 
 
@@ -200,6 +200,48 @@ def test_senders_give_way_to_better_neighbours_and_come_back(gpu):
     assert (fan_areas(half.mesh)[baked.sender, None] * profile.reflectance(fixed))[inner].sum() < 0.4 * best
     assert 0.92 * best < half.weight[inner].sum() < 1.001 * best
     assert all(len(set(own[own >= 0])) == (own >= 0).sum() for own in half.sender), "no sender twice"
+
+
+def test_frames_that_go_back_in_time_start_from_the_senders_at_rest(gpu):
+    scene = moving(slab((12, 12, 2), 700), sheared)
+    stage = Stage(gpu, scene)
+    for time_s in (0.0, 0.25, 0.5):
+        Followed(stage, time_s)
+    back, alone = Followed(stage, 0.2), Followed(Stage(gpu, scene), 0.2)
+    np.testing.assert_array_equal(back.sender, alone.sender)
+    np.testing.assert_array_equal(back.M, alone.M)
+
+
+def test_senders_stay_behind(gpu):
+    """In the hollows of an ear, some of what is turned away is in front."""
+    found = Followed(Stage(gpu, moving(ear(500), lambda x, time_s: twisted(x, 0.3 * time_s))), 1.0)
+    x, n = found.mesh.positions.astype(float), found.mesh.normals.astype(float)
+    between = x[found.sender] - x[:, None]
+    sine = np.einsum("vnd,vd->vn", between, n) / np.linalg.norm(between, axis=2)
+    cosine = np.einsum("vnd,vd->vn", n[found.sender], n)
+    sends = (found.weight > 0).any(axis=2)
+    assert 0.5 < sends.mean()
+    assert sine[sends].max() < 2e-4 and cosine[sends].max() < 2e-4
+    assert not sends.all(), "some have lost what was behind them"
+
+
+def test_objects_that_deform_keep_their_own_maps(gpu):
+    objects = [moving(mesh, swollen).objects[0] for mesh in (sphere(4.0, 200), slab((9, 9, 2), 300))]
+    scene = lit(SIDE, camera=FRONT)
+    apart = [replace(o, translate=(x, 0, 0)) for o, x in zip(objects, (-300, 300), strict=True)]
+
+    def M_back(*objects):
+        stage = Stage(gpu, replace(scene, objects=objects))
+        stage.pose(0.2)
+        graph = Graph(gpu)
+        frame = shared.begin(graph, stage, (8, 8))
+        M = [PLAIN.at_vertices(frame, body, PLAIN.plan(body)) for body in stage.bodies]
+        graph.run(*M)
+        return [graph.read(of_body) for of_body in M]
+
+    for got, o in zip(M_back(*apart), apart, strict=True):
+        (alone,) = M_back(o)
+        assert rms(got - alone) < 0.05 * rms(alone[:, :3])
 
 
 def psnr(M, reference):
