@@ -1,0 +1,82 @@
+"""Fitted senders against all form factors, under light that they were not chosen by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.fit import select_fit
+from wgsss.bake.sam.form_factors import form_factors
+from wgsss.bake.sam.rows import near_pairs
+from wgsss.bake.sam.top import select_top
+from wgsss.scene import MATERIALS
+from wgsss.scene.shapes import ear, gyroid, sphere
+
+PROFILE = MATERIALS["marble"].profile
+
+
+def all_form_factors(gpu, mesh) -> np.ndarray:
+    """K (V, V, 3) of the back side."""
+    x, n = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+    below = np.einsum("oid,od->oi", x - x[:, None], n) < 0
+    pairs = np.argwhere(below & (n @ n.T < 0))
+    K = np.zeros((len(x), len(x), 3), np.float32)
+    K[tuple(pairs.T)] = form_factors(gpu, mesh, PROFILE, pairs)
+    return K
+
+
+def received(entries, light: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """M_back (V, 3) of an irradiance (V,), as frames have it."""
+    at = light
+    if entries.tree is not None:
+        means = entries.tree.sums(light * area) / entries.tree.sums(area)
+        at = np.concatenate([light, means])
+        at[len(light) + entries.blend.node[:, 0]] = entries.blend.of(means)
+    return np.einsum("vn,vnc->vc", np.where(entries.sender < 0, 0.0, at[entries.sender]), entries.weight)
+
+
+@pytest.fixture(scope="module")
+def thin(gpu):
+    mesh = ear(900)
+    return mesh, all_form_factors(gpu, mesh)
+
+
+@pytest.mark.parametrize(("n", "most"), [(1, 0.3), (3, 0.12), (8, 0.06)])
+def test_ear_under_suns_between_those_of_the_choice(gpu, thin, n, most):
+    mesh, K = thin
+    entries = select_fit(gpu, mesh, PROFILE, n)
+    assert entries.sender.shape == (len(mesh.positions), n) and entries.weight.min() >= 0.0
+    rng = np.random.default_rng(7)
+    errors = []
+    for w in rng.normal(size=(4, 3)):
+        light = np.maximum(mesh.normals @ (w / np.linalg.norm(w)), 0.0)
+        wanted = np.einsum("oic,i->oc", K, light)
+        off = received(entries, light, fan_areas(mesh)) - wanted
+        errors.append(np.sqrt(np.square(off).sum() / np.square(wanted).sum()))
+    assert np.mean(errors) < most, errors
+    top = select_top(gpu, mesh, PROFILE, n)
+    assert np.abs(received(top, light, fan_areas(mesh)) - wanted).sum() > 3.0 * np.abs(off).sum()
+
+
+def test_even_light_gives_all_form_factors(gpu, thin):
+    mesh, K = thin
+    entries = select_fit(gpu, mesh, PROFILE, 3)
+    found = received(entries, np.ones(len(mesh.positions)), fan_areas(mesh))
+    wanted = K.sum(axis=1)
+    assert np.sqrt(np.square(found - wanted).sum() / np.square(wanted).sum()) < 0.03
+    assert found.sum() == pytest.approx(wanted.sum(), rel=0.02)
+
+
+def test_nothing_from_beyond_the_range(gpu):
+    thick = sphere(60.0, 300)
+    entries = select_fit(gpu, thick, MATERIALS["skin1"].profile, 3)
+    assert np.all(entries.sender == -1) and not entries.weight.any() and len(entries.blend.node) == 0
+
+
+def test_same_bits_whoever_was_first(gpu):
+    mesh = gyroid(vertices=2000)
+    assert len(near_pairs(mesh))
+    one, two = (select_fit(gpu, mesh, PROFILE, 3) for _ in range(2))
+    np.testing.assert_array_equal(one.sender, two.sender)
+    np.testing.assert_array_equal(one.weight, two.weight)
