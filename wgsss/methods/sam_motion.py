@@ -1,6 +1,9 @@
 """Spatial adjacency maps of meshes that deform (Maisch & Ropinski 2017, 3.4): the form factors of senders follow areas
 and distances, and senders give way to better neighbours. Where they are nodes, which stand for all that is behind a
 vertex, weights follow the sum of all its form factors.
+
+What drifts is which parts of the far side count more: senders only climb to better neighbours, and nodes keep their
+shares. Nothing adds up over time: as the rest pose comes back, so do the senders and weights that were baked for it.
 """
 
 from __future__ import annotations
