@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import runpy
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,49 @@ def test_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         left, right = np.split(np.asarray(picture), 2, axis=1)
     np.testing.assert_array_equal(left, right)
     assert capsys.readouterr().out.count("mean radiance") == 2
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., list[list[str]]]:
+    """Runs a script in examples/ and gives the words of each line of its table."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+
+    def run(name: str, *args: str) -> list[list[str]]:
+        runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](list(args))
+        return [line.split() for line in capsys.readouterr().out.splitlines()]
+
+    return run
+
+
+TINY = ("--receivers", "8", "--vertices", "300")
+
+
+def test_sam_convergence(script: Callable[..., list[list[str]]], tmp_path: Path) -> None:
+    chosen = ("--samples", "1", "100", "--select", "top", "-o", str(tmp_path / "a.png"))
+    _, few, most = script("sam_convergence", "wave", *TINY, *chosen)
+    assert few[:2] == ["top", "1"] and most[:2] == ["top", "100"]
+    assert [float(error) for error in few[2:]] == pytest.approx([0.97, 0.97], abs=0.02)
+    assert max(float(error) for error in most[2:]) < 0.1, "nearly all senders that there are"
+    with Picture.open(tmp_path / "a.png") as picture:
+        assert np.asarray(picture).std() > 10
+
+
+def test_sam_tessellation(script: Callable[..., list[list[str]]]) -> None:
+    _, row = script("sam_tessellation", "--scene", "wave", *TINY)
+    assert abs(int(row[0]) - 300) < 100 and len(row) == 5
+    assert float(row[3]) < 0.5 * float(row[1])
+
+
+def test_sam_flicker(script: Callable[..., list[list[str]]]) -> None:
+    rows = script("sam_flicker", "wave", *TINY, "--rate", "8")
+    assert [row[0] for row in rows[1:]] == ["all", "top", "top", "top", "fit", "fit"]
+    assert all(float(row[6]) < float(row[2]) for row in rows[2:]), "what is blended flickers less"
+
+
+def test_sam_bake_times(script: Callable[..., list[list[str]]]) -> None:
+    rows = script("sam_bake_times", "--scene", "wave", "--vertices", "300", "500", "--select", "top")
+    assert [row[3] for row in rows[1:3]] == ["top", "top"]
+    assert all(float(row[4]) > 0 and row[-1] == "48" for row in rows[1:3])
 
 
 def test_python_in_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,73 @@
+"""Spatial adjacency maps of more and more senders come nearer to the sum over all (Maisch & Ropinski 2017, figure 10).
+
+python examples/sam_convergence.py happy_buddha.obj --material marble --size-mm 150 -o convergence.png
+
+Relative RMSE of M_back, at random vertices, against the sum of form factors times L_d over all vertices on the back
+side: mean over four directional lights with shadows, and under an even sky. With --integral also that of this sum
+itself, against the integral over the surface between the vertices. `fit` ends at 20 samples, since its bake takes far
+longer for more.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from sam_errors import Errors
+
+from wgsss.bake.sam import SELECTIONS
+from wgsss.scene import load_scene
+
+COLOURS = {"top": "#D55E00", "coarse": "#009E73", "fit": "#0072B2"}
+MOST = {"top": 256, "coarse": 256, "fit": 20}
+
+
+def plot(found: dict[str, list[tuple[int, float, float]]], title: str, path: Path) -> None:
+    """Errors over samples, both logarithmic; under a sky dashed."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axis = figure.subplots()
+    for select, rows in found.items():
+        n, suns, sky = zip(*rows, strict=True)
+        axis.loglog(n, suns, "o-", color=COLOURS[select], label=f"{select}, suns")
+        axis.loglog(n, sky, "o--", color=COLOURS[select], label=f"{select}, sky", ms=4, lw=1)
+    ticks = sorted({n for rows in found.values() for n, *_ in rows})
+    axis.set_xticks(ticks, [str(n) for n in ticks])
+    axis.set_xticks([], minor=True)
+    axis.set(xlabel="samples of a vertex", ylabel="relative RMSE of M_back", title=title)
+    axis.grid(alpha=0.25)
+    figure.legend(loc="outside lower center", ncols=len(found), frameon=False)
+    figure.savefig(path, dpi=110)
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    add = parser.add_argument
+    add("scene", nargs="?", default="statue", help="a built-in scene, a scene file or a mesh")
+    add("--material")
+    add("--size-mm", type=float, help="of a mesh: its longest side")
+    add("--vertices", type=int, help="of a built-in scene")
+    add("--receivers", type=int, default=2000, help="vertices at which M_back is compared")
+    add("--samples", nargs="+", type=int, default=[1, 2, 3, 5, 8, 13, 20, 30, 50])
+    add("--select", nargs="+", choices=tuple(SELECTIONS), default=list(SELECTIONS))
+    add("--integral", action="store_true")
+    add("-o", "--output", type=Path, default=Path("sam_convergence.png"))
+    args = parser.parse_args(argv)
+
+    scene = load_scene(args.scene, material=args.material, size_mm=args.size_mm, vertices=args.vertices)
+    errors = Errors(scene, args.receivers)
+    found: dict[str, list[tuple[int, float, float]]] = {}
+    print("select  samples   suns    sky", flush=True)
+    for select in args.select:
+        for samples in [n for n in args.samples if n <= MOST[select]]:
+            print(f"{select}, {samples} samples", file=sys.stderr)
+            found.setdefault(select, []).append((samples, *errors.of(select, samples)))
+            print("{:6}  {:7}  {:.3f}  {:.3f}".format(select, *found[select][-1]), flush=True)
+    if args.integral:
+        print("{:15}  {:.3f}  {:.3f}".format("all, integral", *errors.of_the_sum()))
+    vertices = len(scene.objects[0].mesh.positions)
+    plot(found, f"{scene.name}, {vertices} vertices", args.output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""How far M_back of spatial adjacency maps is from the sum over all vertices behind: what the scripts beside this use.
+
+No light of these is among those that `fit` is tried on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from tqdm import tqdm
+
+from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.frame import begin
+from wgsss.gpu import default_gpu
+from wgsss.graph import Graph
+from wgsss.methods.sam import SpatialAdjacencyMaps
+from wgsss.methods.sam_senders import at_vertices
+from wgsss.reference.convergence import converged, irradiance_at
+from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
+from wgsss.stage import Body, Stage
+
+SUNS = [DirectionalLight(towards, (1, 1, 1)) for towards in ((2, -3, -6), (-6, -2, 3), (3, 6, 2), (0.3, 0.1, 1))]
+SKY = EnvironmentLight((1, 1, 1))
+
+
+class Errors:
+    """Of M_back under suns and under a sky, at some of the vertices of a scene's first object."""
+
+    def __init__(self, scene: Scene, receivers: int) -> None:
+        self.stages = [Stage(default_gpu(), replace(scene, lights=(light,))) for light in (*SUNS, SKY)]
+        self.vertices = at_vertices(scene.objects[0].mesh)
+        self.chosen = np.sort(np.random.default_rng(1).permutation(len(self.vertices.face))[:receivers])
+        bodies = [stage.bodies[0] for stage in self.stages]
+        self.truth = sums(bodies[0], [irradiance_at(body, self.vertices) for body in bodies], self.chosen)
+
+    def of(self, select: str, samples: int) -> tuple[float, float]:
+        """Relative RMSE of a selection, the mean under suns and that under a sky."""
+        method = SpatialAdjacencyMaps(samples=samples, select=select, surface="none")
+        return relative([M_back(stage, method)[self.chosen] for stage in self.stages], self.truth)
+
+    def of_the_sum(self) -> tuple[float, float]:
+        """That of the sum, which takes light as even over a fan, against the integral."""
+        places = replace(self.vertices, **{name: v[self.chosen] for name, v in vars(self.vertices).items()})
+        bodies = [stage.bodies[0] for stage in self.stages]
+        return relative(self.truth, [converged(b, places, b.material.profile, 0.05, 1_000_000).back for b in bodies])
+
+
+def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.ndarray:
+    """(lights, receivers, 3), W/m^2: of all vertices behind each, by form factors (eq. 11) and sides (eq. 13, 14)."""
+    x, n = body.mesh.positions.astype(np.float64), body.mesh.normals.astype(np.float64)
+    factors = FormFactors(body.stage.gpu, body.mesh, body.material.profile)
+    light = np.stack(L_d).astype(np.float64)
+    found = np.zeros((len(light), len(receivers), 3))
+    for row, o in enumerate(tqdm(receivers, desc="sums over all senders", disable=None)):
+        i = np.flatnonzero(((x - x[o]) @ n[o] < 0.0) & (n @ n[o] < 0.0))
+        found[:, row] = np.einsum("kc,lkc->lc", factors.of(np.stack([np.full(len(i), o), i], axis=1)), light[:, i])
+    return found
+
+
+def M_back(stage: Stage, method: SpatialAdjacencyMaps) -> np.ndarray:
+    """(V, 3), W/m^2: of the first object, at its vertices."""
+    graph, body = Graph(stage.gpu), stage.bodies[0]
+    plan = method.plan(body)
+    if plan is None:  # nothing shines through
+        return np.zeros((len(body.mesh.positions), 3))
+    found = method.at_vertices(begin(graph, stage, (8, 8)), body, plan)
+    graph.run(found)
+    return graph.read(found)[:, :3]
+
+
+def relative(found: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, float]:
+    errors = [np.sqrt(np.square(f - t).mean() / np.square(t).mean()) for f, t in zip(found, truth, strict=True)]
+    return float(np.mean(errors[:-1])), float(errors[-1])

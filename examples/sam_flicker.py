@@ -1,0 +1,82 @@
+"""How much spatial adjacency maps flicker where senders pass a shadow's edge, and what blending over time leaves of it.
+
+python examples/sam_flicker.py statue
+
+A sun turns by 40 degrees in one second, at 60 frames per second. Flicker is the RMS of the second difference in time of
+M_back at vertices, over the RMS of M_back, from 0.2 s on, when blending has settled; beside it, how many times that of
+the sum over all vertices behind. Blending (Maisch & Ropinski 2017, eq. 17, 18) also makes what changes late: `off` is
+the relative RMSE against that sum, as it is at the time.
+"""
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from sam_errors import M_back, sums
+from tqdm import tqdm
+
+from wgsss.gpu import default_gpu
+from wgsss.methods.sam import SpatialAdjacencyMaps
+from wgsss.methods.sam_senders import at_vertices
+from wgsss.reference.convergence import irradiance_at
+from wgsss.scene import DirectionalLight, load_scene
+from wgsss.stage import Stage
+
+TURN, SECONDS, SETTLED = 40.0, 1.0, 0.2
+MAPS = (("top", 3), ("top", 8), ("top", 20), ("fit", 3), ("fit", 8))
+
+
+def flicker(M: np.ndarray) -> float:
+    """Of M (frames, vertices, 3)."""
+    return float(np.sqrt(np.square(np.diff(M, n=2, axis=0)).mean() / np.square(M).mean()))
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    add = parser.add_argument
+    add("scene", nargs="?", default="statue", help="a built-in scene")
+    add("--vertices", type=int, default=20_000)
+    add("--receivers", type=int, default=500, help="vertices whose M_back is followed")
+    add("--rate", type=int, default=60, help="frames per second")
+    args = parser.parse_args(argv)
+
+    scene = load_scene(args.scene, vertices=args.vertices).at(0.0)  # nothing but the light moves
+    stage = Stage(default_gpu(), scene)
+    body = stage.bodies[0]
+    times = np.arange(round(args.rate * SECONDS) + 1) / args.rate
+    everywhere = at_vertices(body.mesh)
+    chosen = np.sort(np.random.default_rng(1).permutation(len(everywhere.face))[: args.receivers])
+
+    def shine(time_s: float) -> None:
+        """Turn the sun to where it is at a time."""
+        angle = math.radians(150.0 + TURN * time_s / SECONDS)
+        sun = DirectionalLight((math.sin(angle), -0.4, -math.cos(angle)), (1, 1, 1))
+        stage.rest = replace(scene, lights=(sun,))
+
+    def frames(label: str, look: Callable[[], np.ndarray], *, blended: bool) -> np.ndarray:
+        found = []
+        for time_s in tqdm(times, desc=label, disable=None):
+            shine(time_s)
+            stage.pose(time_s if blended else 0.0)  # frames of one time are not blended
+            found.append(look())
+        return np.array(found)
+
+    light = frames("light", lambda: irradiance_at(body, everywhere), blended=False)
+    truth = sums(body, light, chosen)[times >= SETTLED]
+    print("map      flicker  of the sum's  off    blended  of the sum's  off")
+    print(f"all      {100 * flicker(truth):5.2f} %", flush=True)
+    for select, samples in MAPS:
+        method = SpatialAdjacencyMaps(samples=samples, select=select, surface="none")
+        cells = []
+        for blended in (False, True):
+            M = frames(f"{select} {samples}", lambda m=method: M_back(stage, m)[chosen], blended=blended)
+            M = M[times >= SETTLED]
+            off = np.sqrt(np.square(M - truth).mean() / np.square(truth).mean())
+            cells.append(f"{100 * flicker(M):5.2f} %  {flicker(M) / flicker(truth):12.1f}  {off:.3f}")
+        print(f"{select:5} {samples:2}", *cells, sep="  ", flush=True)
+
+
+if __name__ == "__main__":
+    main()
