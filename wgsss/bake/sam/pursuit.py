@@ -10,7 +10,7 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 
 _DAMPING = 1e-4  # of the mean square of a support: two senders that see the same light share it
-_SWEEPS = 24  # of coordinate descent where a weight would be negative
+_SWEEPS = 32  # of coordinate descent where a weight would be negative
 
 
 def pursue(gram: Array, moment: Array, n: int) -> tuple[Array, Array]:
@@ -76,7 +76,7 @@ def _solve(gram: Array, moment: Array, chosen: Array) -> tuple[Array, Array]:
     wrong = np.flatnonzero((weight < 0.0).any(axis=(1, 2)))
     if len(wrong):
         g, r = damped[wrong], b[wrong]
-        w = np.maximum(weight[wrong], 0.0)
+        w = np.zeros_like(r)  # from nothing it only grows better; senders that see nearly the same would start afar
         for _ in range(_SWEEPS):
             for j in range(k):
                 others = np.einsum("rk,rkc->rc", g[:, j], w) - g[:, j, j, None] * w[:, j]

@@ -51,7 +51,7 @@ class Senders:
     area: Array
     """(V + N,), mm^2"""
     radius: Array
-    """(V + N,), mm, about `x`, within which all vertices of a node are"""
+    """(V + N,), mm, about `x`, within which the fans of all vertices of a node are; 0 of vertices"""
     cone: Array
     """(V + N,), radians, about `n`, within which all their normals are"""
 
@@ -96,7 +96,7 @@ def senders(mesh: Mesh, spread: float) -> Senders:
     radius, cosine = np.zeros(len(weight)), np.ones(len(weight))
     for a, b in pairwise(made.levels):
         own = np.repeat(np.arange(a, b), made.count[a:b])
-        off = np.linalg.norm(x[made.order] - middle[own], axis=1)
+        off = np.linalg.norm(x[made.order] - middle[own], axis=1) + np.sqrt(area[made.order])
         radius[a:b] = np.maximum.reduceat(off, made.first[a:b])
         cosine[a:b] = np.minimum.reduceat(np.einsum("nd,nd->n", n[made.order], normal[own]), made.first[a:b])
     point = np.zeros(len(x))
