@@ -10,11 +10,10 @@ import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
 
 import numpy as np
 
-from wgsss.bake.sam.blend import blend
+from wgsss.bake.sam.blend import Blend, blend
 from wgsss.bake.sam.entries import Entries
 from wgsss.bake.sam.pursuit import pursue
 from wgsss.bake.sam.rows import Array, FormFactors, Senders, reaching, senders
@@ -29,6 +28,8 @@ PATCH = 1
 """level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
 FAINTEST = 1e-3
 """share of what a plane would give back, below which nothing shines through to a vertex"""
+AT_ONCE = 256
+"""patches of a thread's task"""
 _BLOCK = 16_000_000  # numbers that a batch of patches holds at a time, about
 
 
@@ -41,47 +42,57 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     K = FormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
     nodes = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
-    lights = training(mesh).T
-    means = s.tree.sums(lights * s.area[:V, None]) / _positive(s.area[V:, None])
-    light = np.concatenate([lights, nodes.of(means.astype(np.float32)), np.zeros_like(lights[:1])])
-    own = np.concatenate([lights, means.astype(np.float32), np.zeros_like(lights[:1])])
+    light, own = _lights(s, nodes, training(mesh))
     sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
 
-    def fit(batch: tuple[Array, Array]) -> int:
-        vertices, reached = batch
-        k = K(s, vertices[:, :, None], reached[:, None]) * (reached >= 0)[:, None, :, None]
-        candidates = _candidates(s, k, reached)
-        B, P, C, _ = k.shape
-        response = k.transpose(0, 1, 3, 2).reshape(B, 3 * P, C) @ own[reached]
-        seen = light[candidates]
-        moment = (seen @ response.transpose(0, 2, 1)).reshape(B, -1, P, 3).transpose(0, 2, 1, 3)
-        chosen, w = pursue(seen @ seen.transpose(0, 2, 1), moment, n)
-        there = vertices >= 0
-        found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
-        sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
-        return int(there.sum())
+    def fit(patches: Array) -> int:
+        for vertices, reached in _batches(s, K, patches, light.shape[1]):
+            k = K(s, vertices[:, :, None], reached[:, None]) * (reached >= 0)[:, None, :, None]
+            candidates = _candidates(s, k, reached)
+            B, P, C, _ = k.shape
+            response = k.transpose(0, 1, 3, 2).reshape(B, 3 * P, C) @ own[reached]
+            seen = light[candidates]
+            moment = (seen @ response.transpose(0, 2, 1)).reshape(B, -1, P, 3).transpose(0, 2, 1, 3)
+            chosen, w = pursue(seen @ seen.transpose(0, 2, 1), moment, n)
+            there = vertices >= 0
+            found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
+            sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
+        return len(patches)
 
+    levels = s.tree.levels
+    level = min(PATCH, len(levels) - 2)
+    patches = np.arange(levels[level], levels[level + 1])
+    some = [patches[i : i + AT_ONCE] for i in range(0, len(patches), AT_ONCE)]
     # Threads of ours: products of many small matrices are no work for those of a BLAS.
-    threads = os.cpu_count() or 1
     with (
-        tqdm(total=V, desc=f"fitting {n} senders", unit=" vertices", file=sys.stderr, disable=None) as bar,
+        tqdm(total=len(patches), desc=f"fitting {n} senders", unit=" patches", file=sys.stderr, disable=None) as bar,
         threadpool_limits(1, "blas"),
-        ThreadPoolExecutor(threads) as pool,
+        ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
-        batches = _batches(s, K, light.shape[1])
-        while some := list(islice(batches, threads)):
-            bar.update(sum(pool.map(fit, some)))
+        for done in pool.map(fit, some):
+            bar.update(done)
     weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
     sender[~weight.any(axis=2)] = -1
     read = np.unique(sender[sender >= V]) - V
     return Entries(sender, weight, V, tree=s.tree, blend=nodes.only(read))
 
 
-def _batches(s: Senders, K: FormFactors, lights: int) -> Iterator[tuple[Array, Array]]:
+def _lights(s: Senders, nodes: Blend, lights: Array) -> tuple[Array, Array]:
+    """Irradiances (T, V) as they are read, (V + N + 1, T), nodes being blended, and as they are; one row for none."""
+    T, V = lights.shape
+    read, own = np.zeros((2, len(s.area) + 1, T), np.float32)
+    read[:V] = own[:V] = lights.T
+    for first in range(0, T, 16):  # since sums are taken in float64
+        some = slice(first, first + 16)
+        means = s.tree.sums(own[:V, some] * s.area[:V, None]) / _positive(s.area[V:, None])
+        own[V:-1, some] = means
+        read[V:-1, some] = nodes.of(means)
+    return read, own
+
+
+def _batches(s: Senders, K: FormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
     """Patches, those last that much reaches: their vertices (B, P) and what reaches them (B, C); -1 fills up."""
     made, V = s.tree, len(s.tree.order)
-    level = min(PATCH, len(made.levels) - 2)
-    patches = np.arange(made.levels[level], made.levels[level + 1])
     patch, reached = reaching(s, K, V + patches)
     first, count = made.first[patches], made.count[patches]
     start = np.searchsorted(patch, np.arange(len(patches) + 1))
