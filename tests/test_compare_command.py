@@ -49,6 +49,14 @@ def test_json(tmp_path: Path, capsys):
     assert all(Path(file).is_file() and Path(file).parent == tmp_path / "here" for file in found["files"])
 
 
+def test_knobs_of_methods(tmp_path: Path, capsys):
+    methods = "deon07:map_size=64:gaussians=2, deon07:map_size=128,lambert"
+    out, _ = run(capsys, *SMALL[:-1], methods, "-o", str(tmp_path / "here"), "--json")
+    runs = [(run["method"], run["knobs"]) for run in json.loads(out)["methods"]]
+    assert runs[:2] == [("deon07", {"map_size": 64, "gaussians": 2}), ("deon07", {"map_size": 128, "gaussians": 6})]
+    assert len(runs) == 3
+
+
 def test_lights_of_all_types(tmp_path: Path, capsys):
     argv = [*SMALL, "--lights", "all", "-o", str(tmp_path / "here")]
     rows = run(capsys, *argv)[0].split("by type of light: rel RMSE\n")[1].splitlines()

@@ -137,6 +137,15 @@ def assignment(text: str) -> tuple[str, str]:
     return name, value
 
 
+def settings(text: str) -> list[tuple[str, dict[str, str]]]:
+    """NAME,NAME:KNOB=VALUE:…, each once: names and the knobs that are set."""
+    found = []
+    for name in names(text):
+        name, *knobs = (part.strip() for part in name.split(":"))
+        found.append((name, dict(assignment(knob) for knob in knobs)))
+    return found
+
+
 def names(text: str) -> list[str]:
     """NAME,NAME,…, each once."""
     found = [name.strip() for name in text.split(",")]

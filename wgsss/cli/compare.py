@@ -10,12 +10,16 @@ from wgsss.cli import arguments
 _OUTPUT = """the folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); what
 else is in it stays"""
 
+_METHODS = (
+    """such as lambert,sam,sam:select=top:samples=8, with knobs after a colon (default: all, see 'wgsss methods')"""
+)
+
 
 def declare(commands: Any) -> None:
     parser = arguments.command(commands, "compare", run, "compare methods with a reference: pictures, errors, costs")
     arguments.add_scene(parser)
     add = parser.add_argument
-    add("--methods", metavar="A,B,…", type=arguments.names, help="default: all (see 'wgsss methods')")
+    add("--methods", metavar="A,B,…", type=arguments.settings, help=_METHODS)
     add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
     add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
     add("--lights", choices=["all"], help="'all': also under one light of each type, of the same mean irradiance")
@@ -31,7 +35,7 @@ def run(args: Any) -> None:
     from wgsss.study.report import check_folder, write_report
 
     folder = check_folder(args.output or Path(f"{Path(args.scene).stem}-compare"))
-    methods = [make_method(name) for name in args.methods or METHODS]
+    methods = [make_method(name, knobs) for name, knobs in args.methods or ((name, None) for name in METHODS)]
     reference = make_reference(args.reference)
     scene = arguments.load_scene(args)
     found = compare(scene, methods, reference, args.size)

@@ -50,7 +50,11 @@ class SpatialAdjacencyMaps:
     )
 
     source: ClassVar[str] = "Maisch & Ropinski 2017"
-    sweep: ClassVar[tuple[dict[str, Any], ...]] = tuple({"samples": n} for n in (3, 8, 20))
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = (
+        *({"surface": "screen", "samples": n} for n in (3, 8)),
+        *({"surface": "texture", "samples": n} for n in (3, 8)),
+        *({"surface": "texture", "select": other} for other in SELECTIONS if other != "fit"),
+    )
 
     def bake(self, stage: Stage) -> None:
         """Choose the senders of each mesh's vertices for its material; what M_front wants baked."""

@@ -108,10 +108,11 @@ function drawPanel(panel) {
   const steps = best.map(p => `H${x(p.x)}V${y(metric.of(p.run.error))}`);
   const start = `M${x(best[0].x)} ${metric.up ? bottom : TOP}`;
   svg(picture, "path", { class: "front", d: `${start}${steps.join("")}H${WIDTH - RIGHT}` });
-  for (const method of new Set(runs.map(run => run.method))) {
-    const own = runs.filter(run => run.method === method);
+  const words = run => [run.method, ...Object.values(run.knobs).filter(value => typeof value === "string")].join(" ");
+  for (const curve of new Set(runs.map(words))) {
+    const own = runs.filter(run => words(run) === curve);
     const places = own.map(run => [x(run.frame_ms), y(metric.of(run.error))]);
-    svg(picture, "polyline", { class: "sweep", points: places.join(" "), stroke: colour(method) });
+    svg(picture, "polyline", { class: "sweep", points: places.join(" "), stroke: colour(own[0].method) });
   }
   const taken = points.map(point => around(...at(point)));
   for (const point of points) {

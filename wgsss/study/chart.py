@@ -127,6 +127,11 @@ def labels(runs: Sequence[Run]) -> list[str]:
     return found
 
 
+def _words(run: Run) -> tuple[str, ...]:
+    """The knobs of a run that are words: along a curve, numbers change."""
+    return tuple(value for value in run["knobs"].values() if isinstance(value, str))
+
+
 def caption(found: Sequence[Panel]) -> str:
     """What the chart shows, where and when it was measured."""
     runs = [run for panel in found for run in panel.runs]
@@ -207,7 +212,9 @@ def _panel(axis: Axes, panel: Panel) -> list[Label]:
     for method in dict.fromkeys(run["method"] for run in shown):
         own = [i for i, run in enumerate(shown) if run["method"] == method]
         colour = style(method)[0]
-        axis.plot(*zip(*(points[i] for i in own), strict=True), "--", color=colour, lw=1.2, alpha=0.45, zorder=3)
+        for words in dict.fromkeys(_words(shown[i]) for i in own):
+            curve = [points[i] for i in own if _words(shown[i]) == words]
+            axis.plot(*zip(*curve, strict=True), "--", color=colour, lw=1.2, alpha=0.45, zorder=3)
         for i in own:
             axis.plot(shown[i]["frame_ms_quartiles"], [points[i][1]] * 2, color=colour, lw=1.0, alpha=0.6, zorder=3)
             axis.plot(*points[i], **_mark(style(method), i in best), zorder=5 if i in best else 4)
