@@ -15,8 +15,9 @@ struct Params {
     near: vec3f,       // share of L_d at x_o itself: what the samples stand too far apart for
     unit: Number,      // of the table, 1/mm^2
     first_entry: u32,  // of the table, as the leading bits of the squared distance
-    first_object: u32, // 1 where nothing has been written yet: what it is not seen at is set to 0
 }
+
+override FIRST: u32 = 1u; // 0 where another object has been written: what this one is not seen at stays
 
 // Of the length of a normal.
 const ROUNDING: Number = 1e-6;
@@ -137,7 +138,7 @@ fn store(first: vec2u, from_nodes: Sums) {
         if is_seen(texel) {
             textureStore(M_front, texel, vec4f((M - back) * after, 1.0));
             textureStore(M_back, texel, vec4f(back * after, 1.0));
-        } else if params.first_object == 1u {
+        } else if FIRST == 1u {
             textureStore(M_front, texel, vec4f(0.0));
             textureStore(M_back, texel, vec4f(0.0));
         }
