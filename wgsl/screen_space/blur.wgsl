@@ -12,9 +12,10 @@ struct Params {
     clip_to_world: mat4x4f,
     rectangle: vec4f, // where the object may be
     scale: vec3f,   // of what comes out of the second direction
-    direction: u32, // 0 or 1
     coarsest: f32,  // pixels per mm of level 0
 }
+
+override DIRECTION: u32 = 0u; // or 1
 
 struct Tap {
     weight: vec3f, // of each of the two pixels
@@ -88,7 +89,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let t_x = right.xyz / here.w; // mm per pixel
     let t_y = down.xyz / here.w;
     var step = vec2f(1.0, 0.0); // to the next pixel, along the rows or along the columns
-    if params.direction == 1u {
+    if DIRECTION == 1u {
         let lean = -dot(t_x, t_y) / dot(t_x, t_x);
         step = vec2f(lean, 1.0) / max(abs(lean), 1.0);
     }
@@ -109,7 +110,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         back = walked(back, opposite.a, -flat, middle.a - opposite.a + rise, away, here.w);
         total += tap.weight * (mix(middle.rgb, there.rgb, ahead.kept) + mix(middle.rgb, opposite.rgb, back.kept));
     }
-    if params.direction == 0u {
+    if DIRECTION == 0u {
         return Pixel(vec4f(total, middle.a));
     }
     let color = params.scale * color_after(surface, textureLoad(base_color, texel, 0).rgb);

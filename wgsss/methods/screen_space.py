@@ -93,10 +93,10 @@ class ScreenSpace:
                     label="xy"[direction],
                     params={
                         "scale": taps.scale,
-                        "direction": direction,
                         "coarsest": taps.pixels_per_mm[0],
                         **where,
                     },
+                    constants={"DIRECTION": direction},
                     surface=body.surface,
                     taps=buffer,
                     source=M,
