@@ -56,6 +56,14 @@ def test_the_other_side_of_a_sheet_does_not_count(square):
     assert found.weight[finest][across].max() < np.exp(-(1.0 + 4.0) / 2 / WIDTH**2) * 1.01
 
 
+def test_each_mean_is_its_own_even_where_nodes_are_at_one_place():
+    x = np.zeros((64, 3))
+    made = tree(x)
+    found = blend(made, np.zeros((len(made.first), 3)), np.zeros((len(made.first), 3)), made.sums(np.ones(64)))
+    np.testing.assert_array_equal(found.node[:, 0], np.arange(len(made.first)))
+    assert all(len(set(row)) == NEIGHBOURS for row in found.node[: made.levels[1]])
+
+
 def test_a_root_alone():
     one = blend(tree(np.zeros((1, 3))), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
     np.testing.assert_array_equal(one.weight[0], [1.0] + [0.0] * (NEIGHBOURS - 1))

@@ -7,7 +7,7 @@ import pytest
 
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import form_factors
-from wgsss.bake.sam.rows import FormFactors, near_pairs, reaching, senders
+from wgsss.bake.sam.rows import QuickFormFactors, near_pairs, reaching, senders
 from wgsss.scene import MATERIALS
 from wgsss.scene.shapes import ear, gyroid, slab
 
@@ -24,7 +24,7 @@ def behind(mesh, o: int) -> np.ndarray:
 def test_they_sum_to_the_form_factors_of_all(gpu, mesh):
     """Under light from one side, within 2 % RMS of fans integrated one by one, and 1 % in all."""
     V = len(mesh.positions)
-    s, K = senders(mesh, 10.0), FormFactors(gpu, mesh, PROFILE)
+    s, K = senders(mesh, 10.0), QuickFormFactors(gpu, mesh, PROFILE)
     light = np.maximum(mesh.normals @ np.array([0.6, 0.0, 0.8], np.float32), 0.0)
     means = np.concatenate([light, s.tree.sums(light * s.area[:V]) / s.area[V:]])
     patches = np.arange(s.tree.levels[1], s.tree.levels[2])
@@ -46,7 +46,7 @@ def test_they_sum_to_the_form_factors_of_all(gpu, mesh):
 def test_no_vertex_counts_twice_and_none_behind_is_missed(gpu):
     mesh = ear(600)
     V = len(mesh.positions)
-    s, K = senders(mesh, 10.0), FormFactors(gpu, mesh, PROFILE)
+    s, K = senders(mesh, 10.0), QuickFormFactors(gpu, mesh, PROFILE)
     patches = np.arange(s.tree.levels[1], s.tree.levels[2])
     patch, node = reaching(s, K, V + patches)
     assert np.all(np.diff(patch) >= 0)

@@ -51,6 +51,9 @@ def blend(tree: Tree, x: Array, n: Array, area: Array) -> Blend:
         place = np.concatenate([x[a:b] / width, n[a:b]], axis=1)
         k = min(NEIGHBOURS, b - a)
         away, near = KDTree(place).query(place, k=np.arange(1, k + 1))
+        own = np.arange(b - a)[:, None]
+        near = np.where(near == own, near[:, :1], near)  # of several at one place, any may be found first
+        near[:, :1] = own
         node[a:b, :k] = a + near
         weight[a:b, :k] = np.exp(-np.square(away) / (2.0 * WIDTH**2)) * np.maximum(area[a:b], 1e-30)[near]
     return Blend(node, weight / weight.sum(axis=1, keepdims=True))

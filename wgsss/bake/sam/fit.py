@@ -16,7 +16,7 @@ import numpy as np
 from wgsss.bake.sam.blend import Blend, blend
 from wgsss.bake.sam.entries import Entries
 from wgsss.bake.sam.pursuit import pursue
-from wgsss.bake.sam.rows import Array, FormFactors, Senders, reaching, senders
+from wgsss.bake.sam.rows import Array, QuickFormFactors, Senders, reaching, senders
 from wgsss.bake.sam.training import training
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
@@ -39,7 +39,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     from tqdm import tqdm
 
     V = len(mesh.positions)
-    K = FormFactors(gpu, mesh, profile)
+    K = QuickFormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
     nodes = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
     light, own = _lights(s, nodes, training(mesh))
@@ -90,7 +90,7 @@ def _lights(s: Senders, nodes: Blend, lights: Array) -> tuple[Array, Array]:
     return read, own
 
 
-def _batches(s: Senders, K: FormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
+def _batches(s: Senders, K: QuickFormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
     """Patches, those last that much reaches: their vertices (B, P) and what reaches them (B, C); -1 fills up."""
     made, V = s.tree, len(s.tree.order)
     patch, reached = reaching(s, K, V + patches)

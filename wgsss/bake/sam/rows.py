@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.form_factors import FormFactors as Integrated
+from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.tree import Tree, tree
 from wgsss.gpu import Gpu
@@ -105,7 +105,7 @@ def senders(mesh: Mesh, spread: float) -> Senders:
     return Senders(made, *(np.concatenate(pair).astype(np.float32) for pair in zip(of_vertices, of_nodes, strict=True)))
 
 
-class FormFactors:
+class QuickFormFactors:
     """K from senders to vertices: between near fans integrated over both, beyond that R_d at their distance."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
@@ -119,7 +119,7 @@ class FormFactors:
         pairs = near_pairs(mesh)
         self._vertices = len(mesh.positions)
         self._pairs = pairs[:, 0] * self._vertices + pairs[:, 1]
-        self._near = Integrated(gpu, mesh, profile).of(pairs, most=ORDER)
+        self._near = FormFactors(gpu, mesh, profile).of(pairs, most=ORDER)
 
     def reflectance(self, squared: Array) -> Array:
         """R_d, 1/mm^2, (..., 3), at the roots of `squared` (...) mm^2."""
@@ -157,7 +157,7 @@ def near_pairs(mesh: Mesh) -> Array:
     return np.stack([o, i], axis=1)[below]
 
 
-def reaching(s: Senders, K: FormFactors, patches: Array) -> tuple[Array, Array]:
+def reaching(s: Senders, K: QuickFormFactors, patches: Array) -> tuple[Array, Array]:
     """What may reach nodes `patches` (p,) from behind: pairs of an index into `patches` and a sender, in order.
 
     Every vertex is under at most one sender of a patch.
