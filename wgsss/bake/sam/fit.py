@@ -119,7 +119,7 @@ def _ranges(values: Array, first: Array, count: Array) -> Array:
 
 def _candidates(s: Senders, k: Array, reached: Array) -> Array:
     """Senders (B, candidates) by form factors k (B, P, C, 3) of what reaches the patches (B, C); -1 fills up."""
-    share = (k / _positive(k.sum(axis=2, keepdims=True))).mean(axis=3)
+    share = np.einsum("bpck,bpk->bpc", k, 1.0 / (3.0 * _positive(k.sum(axis=2))))
     drawn = np.diff(np.floor(np.cumsum(share, axis=2) * DRAWS + 0.5), axis=2, prepend=0.0) > 0.0
     patch, column = np.nonzero(drawn.any(axis=1))
     sender, all_ = reached[patch, column], len(s.area)

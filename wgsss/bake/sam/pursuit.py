@@ -34,7 +34,8 @@ def pursue(gram: Array, moment: Array, n: int) -> tuple[Array, Array]:
 
     def add(kept: Array, weight: Array) -> tuple[Array, Array, Array]:
         left = moment - _seen(gram, kept, weight)
-        score = np.square(np.maximum(left, 0.0)).sum(axis=3) / square
+        useful = np.maximum(left, 0.0)
+        score = np.einsum("bpck,bpck->bpc", useful, useful) / square
         np.put_along_axis(score, kept, -1.0, axis=2)
         grown = np.concatenate([kept, score.argmax(axis=2)[..., None]], axis=2)
         return grown, *_solve(gram, moment, grown)

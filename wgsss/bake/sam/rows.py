@@ -134,10 +134,13 @@ class QuickFormFactors:
         apart = s.centre[i] - s.centre[o]
         R = self.reflectance(np.einsum("...d,...d->...", apart, apart) + s.extent[i])
         K = R * np.where(back, s.area[i], np.float32(0.0))[..., None]
-        if len(self._pairs):
-            pair = np.where(back & (i < self._vertices), o * np.int64(self._vertices) + i, -1)
-            at = np.minimum(np.searchsorted(self._pairs, pair), len(self._pairs) - 1)
-            K = np.where((self._pairs[at] == pair)[..., None], self._near[at], K)
+        near = np.einsum("...d,...d->...", between, between) < 1.01 * NEAR**2 * np.maximum(s.area[i], s.area[o])
+        near &= back & (i < self._vertices)
+        pair = (o * np.int64(self._vertices) + i)[near]
+        at = np.searchsorted(self._pairs, pair)
+        known = np.append(self._pairs, -1)[at] == pair
+        near[near] = known
+        K[near] = self._near[at[known]]
         return K
 
 
