@@ -80,3 +80,12 @@ def test_same_bits_whoever_was_first(gpu):
     one, two = (select_fit(gpu, mesh, PROFILE, 3) for _ in range(2))
     np.testing.assert_array_equal(one.sender, two.sender)
     np.testing.assert_array_equal(one.weight, two.weight)
+
+
+def test_meshes_whose_fans_are_never_near(gpu):
+    """Nothing to integrate, and patches that are not full."""
+    thick = sphere(8.0, 400)
+    assert not len(near_pairs(thick))
+    entries = select_fit(gpu, thick, PROFILE, 2)
+    K = all_form_factors(gpu, thick).sum(axis=1)
+    np.testing.assert_allclose(received(entries, np.ones(len(K)), fan_areas(thick)), K, rtol=0.1)

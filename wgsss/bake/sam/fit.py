@@ -135,4 +135,4 @@ def _candidates(s: Senders, k: Array, reached: Array) -> Array:
 
 
 def _positive(values: Array) -> Array:
-    return np.where(values > 0.0, values, 1.0)
+    return np.where(values > 1e-30, values, 1.0)  # whose inverse float32 holds, too

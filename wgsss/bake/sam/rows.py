@@ -138,7 +138,7 @@ class QuickFormFactors:
         near &= back & (i < self._vertices)
         pair = (o * np.int64(self._vertices) + i)[near]
         at = np.searchsorted(self._pairs, pair)
-        known = np.append(self._pairs, -1)[at] == pair
+        known = np.append(self._pairs, np.iinfo(np.int64).max)[at] == pair
         near[near] = known
         K[near] = self._near[at[known]]
         return K
