@@ -72,6 +72,21 @@ def test_vertices_receive_what_their_entries_read(gpu, monkeypatch, vertices, fe
     assert len(read) - len(over.first) <= (60 if few else len(L)), "no light where nobody looks"
 
 
+def test_fitted_entries_read_means_that_fade_into_their_neighbours(gpu):
+    stage = Stage(gpu, lit(SIDE, mesh=ear(500), material=MARBLE, camera=FRONT))
+    method, mesh = replace(PLAIN, select="fit"), stage.bodies[0].rest.mesh
+    (M,) = Passes(stage, method).at_vertices
+    entries, light, area = method.map(stage.bodies[0]), light_at_vertices(stage)[:, :3], fan_areas(mesh)
+    assert (entries.sender >= entries.senders).mean() > 0.3
+    means = entries.tree.sums(light * area[:, None]) / entries.tree.sums(area)[:, None]
+    read = np.full((entries.senders + len(means), 3), np.nan)
+    read[: entries.senders] = light
+    read[entries.senders + entries.blend.node[:, 0]] = entries.blend.of(means)
+    wanted = np.einsum("vnc,vnc->vc", entries.weight, read[np.maximum(entries.sender, 0)])
+    assert M.max() > 0.1
+    np.testing.assert_allclose(M, wanted, rtol=1e-4, atol=1e-5)
+
+
 def test_in_even_light_they_receive_the_sum_of_their_weights(gpu):
     mesh = sphere(2.0, 300)
     stage = Stage(gpu, lit(WHITE_SKY, mesh=mesh, material=MARBLE, camera=FRONT))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.bake.sam.blend import NEIGHBOURS, WIDTH, Blend, blend
+from wgsss.bake.sam.blend import WIDTH, Blend, blend
 from wgsss.bake.sam.tree import Tree, tree
 
 
@@ -38,7 +38,7 @@ def test_weights_are_gaussian_in_units_of_a_node(flat, square):
     weight = np.sort(flat.weight[inside], axis=1)[:, ::-1]
     np.testing.assert_allclose(weight[:, 1:5] / weight[:, :1], side, rtol=1e-4)
     np.testing.assert_allclose(weight[:, 5:] / weight[:, :1], side**2, rtol=1e-4)
-    assert np.ptp(area[level]) == 0.0 and weight.shape[1] == NEIGHBOURS
+    assert np.ptp(area[level]) == 0.0 and weight.shape[1] == 9
 
 
 def test_neighbours_are_of_the_same_level(flat, square):
@@ -61,9 +61,9 @@ def test_each_mean_is_its_own_even_where_nodes_are_at_one_place():
     made = tree(x)
     found = blend(made, np.zeros((len(made.first), 3)), np.zeros((len(made.first), 3)), made.sums(np.ones(64)))
     np.testing.assert_array_equal(found.node[:, 0], np.arange(len(made.first)))
-    assert all(len(set(row)) == NEIGHBOURS for row in found.node[: made.levels[1]])
+    assert all(len(set(row)) == 9 for row in found.node[: made.levels[1]])
 
 
 def test_a_root_alone():
     one = blend(tree(np.zeros((1, 3))), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
-    np.testing.assert_array_equal(one.weight[0], [1.0] + [0.0] * (NEIGHBOURS - 1))
+    np.testing.assert_array_equal(one.weight[0], [1.0] + [0.0] * 8)

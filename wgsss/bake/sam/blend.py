@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss import wgsl
 from wgsss.bake.sam.tree import Tree
 
 Array = npt.NDArray[Any]
 
-NEIGHBOURS = 9
-"""nodes of one level in a mean, itself among them"""
 WIDTH = 0.7
 """sigma of their weights by distance, in roots of a node's area. Means that end at borders err a third more."""
 
@@ -24,9 +23,9 @@ class Blend:
     """Means of nodes of a tree, each with some of those beside it."""
 
     node: Array
-    """int32 (U, NEIGHBOURS): nodes of the tree, each mean's own first"""
+    """int32 (U, k): nodes of the tree, each mean's own first"""
     weight: Array
-    """float32 (U, NEIGHBOURS), summing to 1; 0 where there are fewer"""
+    """float32 (U, k), summing to 1; 0 where there are fewer"""
 
     def of(self, means: Array) -> Array:
         """(U, ...): blended means (N, ...)."""
@@ -44,12 +43,13 @@ def blend(tree: Tree, x: Array, n: Array, area: Array) -> Blend:
     """
     from scipy.spatial import KDTree
 
-    node = np.repeat(np.arange(len(area), dtype=np.int32)[:, None], NEIGHBOURS, axis=1)
-    weight = np.zeros((len(area), NEIGHBOURS), np.float32)
+    most = wgsl.load("sam/blends").constants["NEIGHBOURS"]
+    node = np.repeat(np.arange(len(area), dtype=np.int32)[:, None], most, axis=1)
+    weight = np.zeros((len(area), most), np.float32)
     for a, b in pairwise(tree.levels):
         width = max(float(np.sqrt(area[a:b].mean())), 1e-30)
         place = np.concatenate([x[a:b] / width, n[a:b]], axis=1)
-        k = min(NEIGHBOURS, b - a)
+        k = min(most, b - a)
         away, near = KDTree(place).query(place, k=np.arange(1, k + 1))
         own = np.arange(b - a)[:, None]
         near = np.where(near == own, near[:, :1], near)  # of several at one place, any may be found first
