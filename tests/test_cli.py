@@ -20,7 +20,7 @@ from conftest import ROOT
 from PIL import Image as Picture
 
 from wgsss.cli import main
-from wgsss.methods import METHODS
+from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
 from wgsss.reference import REFERENCES
 from wgsss.rendering import AOVS, DEFAULT_METHOD
 from wgsss.scene import MATERIALS
@@ -67,7 +67,7 @@ def test_lists_have_every_name_with_something_to_say_about_it(
     wgsss: Run, command: str, names: dict[str, object]
 ) -> None:
     text = wgsss(command)
-    said = [line for line in text.out.splitlines() if not line.startswith(" ")]
+    said = [line for line in text.out.split("\n\n")[0].splitlines() if not line.startswith(" ")]
     lines = [line.split(maxsplit=1) for line in said if not line.endswith(" (a reference)")]
     assert [line[0] for line in lines] == list(names)
     assert all(len(line) == 2 for line in lines)
@@ -81,6 +81,12 @@ def test_references_are_listed_after_the_methods(wgsss: Run) -> None:
     assert [line.split()[0] for line in text.splitlines() if line.endswith(" (a reference)")] == list(REFERENCES)
     listed = json.loads(wgsss("methods", "--json").out)["references"]
     assert [entry["name"] for entry in listed] == list(REFERENCES)
+
+
+def test_surfaces_and_translucencies_are_listed_as_what_pairs_are_made_of(wgsss: Run) -> None:
+    pairs = json.loads(wgsss("methods", "--json").out)["pairs"]
+    assert pairs == {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
+    assert f"--surface one of {', '.join(SURFACES)}" in wgsss("methods").out
 
 
 def test_methods_list_knobs_with_unit_default_and_range(wgsss: Run) -> None:
@@ -246,6 +252,9 @@ BAD = [
     ("render eer", "unknown scene 'eer'; did you mean 'ear'?"),
     ("render ear --material marbel", "unknown material 'marbel'; did you mean 'marble'?"),
     ("render ear --method deon70", "unknown method 'deon70'; did you mean 'deon07'?"),
+    ("render ear --surface paper", "unknown surface 'paper'"),
+    ("render ear --translucency samm", "unknown translucency 'samm'; did you mean 'sam'?"),
+    ("render ear --method sam --surface screen", "name either it or those"),
     ("render ear --set mapsize=512", "unknown knob of deon07 'mapsize'; did you mean 'map_size'?"),
     ("render ear --set map_size=12", "map_size must lie between 64 and 4096, not 12"),
     ("render ear --set map_size=big", "map_size must be a whole number, not 'big'"),

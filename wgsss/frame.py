@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -44,6 +45,13 @@ class Frame:
     gbuffer: SimpleNamespace
     lighting: SimpleNamespace
     rho_dt: dict[tuple[float, float], Handle]
+    made: dict[Any, Any] = field(default_factory=dict)
+
+    def once(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What `make` declares, the first time that it is asked for by `key`."""
+        if key not in self.made:
+            self.made[key] = make()
+        return self.made[key]
 
     def rho_dt_table(self, body: Body) -> Handle:
         """The table of rho_dt for a body's surface."""
@@ -146,6 +154,10 @@ def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
 
 def irradiance_pixels(frame: Frame) -> Handle:
     """L_d, W/m^2, at each pixel."""
+    return frame.once("irradiance", lambda: _irradiance_pixels(frame))
+
+
+def _irradiance_pixels(frame: Frame) -> Handle:
     irradiance: Any = None
     for body in frame.stage.bodies:
         irradiance = frame.graph.draw(

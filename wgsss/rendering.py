@@ -80,7 +80,7 @@ class Renderer:
         scene = self.stage.scene
         display = shared.tone_map(graph, radiance, scene.exposure, scene.tone_map)
         handles: dict[str, Handle | None] = {
-            "irradiance": diffused.irradiance or shared.irradiance_pixels(frame),
+            "irradiance": shared.irradiance_pixels(frame),
             "M_front": diffused.M_front,
             "M_back": diffused.M_back,
             "specular": reflected,

@@ -53,7 +53,9 @@ def add_scene(parser: Parser) -> None:
 def add_method(parser: Parser) -> None:
     """The method, and its knobs."""
     add = parser.add_argument
-    add("--method", metavar="NAME", default=DEFAULT_METHOD, help="default: %(default)s (see 'wgsss methods')")
+    add("--method", metavar="NAME", help=f"default: {DEFAULT_METHOD} (see 'wgsss methods')")
+    add("--surface", metavar="NAME", help="instead of a method: what estimates the light from the front, and")
+    add("--translucency", metavar="NAME", help="what estimates that from the back; of one alone, the other is none")
     add("--set", metavar="KNOB=VALUE", dest="knobs", type=assignment, action="append", default=[], help="set a knob")
 
 
@@ -68,7 +70,12 @@ def make_method(args: argparse.Namespace) -> Method:
     """The method that the arguments name, its knobs set."""
     from wgsss.methods import make_method
 
-    return make_method(args.method, dict(args.knobs))
+    name = args.method or DEFAULT_METHOD
+    if args.surface or args.translucency:
+        if args.method:
+            raise InputError(f"--method {args.method} has a surface and a translucency: name either it or those")
+        name = f"{args.surface or 'none'}+{args.translucency or 'none'}"
+    return make_method(name, dict(args.knobs))
 
 
 def tell(args: argparse.Namespace, result: Any, text: str) -> None:

@@ -21,7 +21,7 @@ def scenes(args: Any) -> None:
 
 
 def methods(args: Any) -> None:
-    from wgsss.methods import METHODS
+    from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
     from wgsss.reference import REFERENCES
 
     result = {"methods": _described(METHODS), "references": _described(REFERENCES)}
@@ -31,7 +31,10 @@ def methods(args: Any) -> None:
             rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
             for knob in entry["knobs"]:
                 rows.append(["", f"--set {knob['name']}={knob['default']}  {knob['help']}, {_values(knob)}"])
-    arguments.tell(args, result, arguments.table(rows))
+    pairs = {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
+    lines = [f"--{part} one of {', '.join(names)}" for part, names in pairs.items()]
+    text = "\n".join([arguments.table(rows), "", "or a pair of", *(f"  {line}" for line in lines)])
+    arguments.tell(args, {**result, "pairs": pairs}, text)
 
 
 def _values(knob: dict[str, Any]) -> str:

@@ -39,12 +39,14 @@ def declare(commands: Any) -> None:
 def run(args: Any) -> None:
     from dataclasses import replace
 
+    from wgsss.methods import name_of
     from wgsss.output import check_output, replacing, save, save_frames
     from wgsss.rendering import Renderer
 
     path = check_output(args.output or Path(f"{Path(args.scene).stem}.png"))
     dot = args.graph_out and check_output(args.graph_out, (".dot",))
     method = arguments.make_method(args)
+    name = name_of(method)
     scene = arguments.load_scene(args)
     own = {"exposure": args.exposure, "tone_map": args.tone_map}
     scene = replace(scene, **{key: value for key, value in own.items() if value is not None})
@@ -59,7 +61,7 @@ def run(args: Any) -> None:
     result: dict[str, Any] = {
         "files": [str(file) for file in written],
         "scene": scene.name,
-        "method": args.method,
+        "method": name,
         "knobs": vars(method),
         "size": args.size,
         "frames": args.frames,
@@ -67,7 +69,7 @@ def run(args: Any) -> None:
         "seconds": {"prepare": round(ready - start, 3), "frames": round(done - ready, 3)},
     }
     files = str(written[0]) if len(written) == 1 else f"{written[0]} … {written[-1].name}"
-    lines = [f"{files}: {scene.name} by {args.method}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
+    lines = [f"{files}: {scene.name} by {name}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
     if args.graph or dot:
         graph = renderer.frame(_time(args, args.frames - 1), timed=True).graph
         if dot:

@@ -1,4 +1,7 @@
-"""The methods by name. A new one is a file here, its modules in `wgsl/`, a row below and its goldens."""
+"""The methods by name. A new one is a file here, its modules in `wgsl/`, a row below and its goldens.
+
+Any surface may be asked for with any translucency that makes sense beside it: "screen+sam" names a pair.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,13 @@ from typing import Any
 from wgsss.errors import InputError, unknown
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
+from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
-from wgsss.methods.sam import SpatialAdjacencyMaps
+from wgsss.methods.sam import SURFACES, Adjacency, SpatialAdjacencyMaps
 from wgsss.methods.texture_space import TextureSpace
+
+TRANSLUCENCIES: dict[str, type[Translucency]] = {"sam": Adjacency}
+"""What estimates M_back. "none" leaves it black."""
 
 METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
@@ -20,18 +27,33 @@ METHODS: dict[str, type[Method]] = {
 }
 
 
+def kind_of(name: str) -> type[Method]:
+    """The method, the pair SURFACE+TRANSLUCENCY or the reference `name`.
+
+    Raises InputError for a name that is not known and a pair that makes no sense.
+    """
+    from wgsss.reference import REFERENCES
+
+    surface, plus, translucency = name.partition("+")
+    if plus:
+        if surface not in SURFACES:
+            raise unknown("surface", surface, SURFACES)
+        if translucency not in ("none", *TRANSLUCENCIES):
+            raise unknown("translucency", translucency, ("none", *TRANSLUCENCIES))
+        return SURFACES[surface] if translucency == "none" else pair(SURFACES[surface], TRANSLUCENCIES[translucency])
+    kinds = {**METHODS, **REFERENCES}
+    if name not in kinds:
+        raise unknown("method", name, kinds)
+    return kinds[name]
+
+
 def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
-    """The method, or the reference, `name` with its knobs set.
+    """The method, the pair or the reference `name` with its knobs set.
 
     Raises InputError for a name or knob that is not known, or a value that is not of the knob's type and range, or not
     one of its choices.
     """
-    from wgsss.reference import REFERENCES
-
-    kinds = {**METHODS, **REFERENCES}
-    if name not in kinds:
-        raise unknown("method", name, kinds)
-    kind = kinds[name]
+    kind = kind_of(name)
     known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
     values = {}
     for knob, value in (knobs or {}).items():
@@ -42,10 +64,18 @@ def make_method(name: str, knobs: dict[str, Any] | None = None) -> Method:
 
 
 def name_of(method: Method) -> str:
-    """The name that a method or a reference goes by."""
+    """The name that a method, a pair or a reference goes by."""
     from wgsss.reference import REFERENCES
 
-    return next((n for n, kind in {**METHODS, **REFERENCES}.items() if kind is type(method)), type(method).__name__)
+    for name, kind in {**METHODS, **REFERENCES}.items():
+        if kind is type(method):
+            return name
+    surface, translucency = method.parts if isinstance(method, Pair) else (type(method), None)
+    names = [
+        *(name for name, kind in SURFACES.items() if kind is surface),
+        *(name for name, part in TRANSLUCENCIES.items() if part is translucency),
+    ]
+    return "+".join([*names, "none"][:2]) if names else type(method).__name__
 
 
 def _parsed(where: str, knob: Any, value: Any) -> Any:
@@ -66,4 +96,4 @@ def _parsed(where: str, knob: Any, value: Any) -> Any:
     return parsed
 
 
-__all__ = ["METHODS", "Diffused", "Method", "make_method", "name_of"]
+__all__ = ["METHODS", "SURFACES", "TRANSLUCENCIES", "Diffused", "Method", "kind_of", "make_method", "name_of"]

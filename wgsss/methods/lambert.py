@@ -34,4 +34,4 @@ class Lambert:
                 irradiance=irradiance,
                 **frame.seen("where_seen", "base_color"),
             )
-        return Diffused(M_front, irradiance=irradiance)
+        return Diffused(M_front)

@@ -12,14 +12,10 @@ from wgsss.stage import Stage
 
 @dataclass(frozen=True)
 class Diffused:
-    """What a method estimates, per pixel, rgba32float at the frame's size: M in W/m^2. A slot left empty is None.
-
-    `irradiance` is L_d at the pixels where the method had it anyway.
-    """
+    """What a method estimates, per pixel, rgba32float at the frame's size: M in W/m^2. A slot left empty is None."""
 
     M_front: Handle
     M_back: Handle | None = None
-    irradiance: Handle | None = None
 
 
 class Method(Protocol):

@@ -107,7 +107,7 @@ class PointCloud:
                 **frame.seen("where_seen", "normal", "base_color", "depth"),
             )
             M = vars(gathered)
-        return Diffused(M["M_front"], M["M_back"], irradiance)
+        return Diffused(M["M_front"], M["M_back"])
 
     def _table(self, body: Body) -> Any:
         kernel = self.kernel(body)

@@ -30,13 +30,11 @@ KEPT_A_SECOND = 1e-10
 
 
 @dataclass(frozen=True)
-class SpatialAdjacencyMaps:
-    """M_back as a sum over `samples` senders of each vertex (eq. 12); M_front by another method.
+class Adjacency:
+    """M_back as a sum over `samples` senders of each vertex (eq. 12).
 
-    The paper adds M_back to the irradiance that the surface method then blurs (4.3). Here the two are added as they
-    are: the form factors already are means over the receiving fan (eq. 11), and blurring M_back would scale it by the
-    profile's total. Frames in the order of their time blend M_back with that of the frame before (eq. 17, 18); the
-    first one, one that is not after the last, and a scene that is rendered alone at a time, are as they are.
+    Frames in the order of their time blend M_back with that of the frame before (eq. 17, 18); the first one, one that
+    is not after the last, and a scene that is rendered alone at a time, are as they are.
     """
 
     samples: int = field(
@@ -45,22 +43,15 @@ class SpatialAdjacencyMaps:
     select: str = field(
         default="fit", metadata={"unit": "", "choices": tuple(SELECTIONS), "help": "how they are chosen"}
     )
-    surface: str = field(
-        default="texture", metadata={"unit": "", "choices": tuple(SURFACES), "help": "where M_front is estimated"}
-    )
 
     source: ClassVar[str] = "Maisch & Ropinski 2017"
-    sweep: ClassVar[tuple[dict[str, Any], ...]] = (
-        *({"surface": "screen", "samples": n} for n in (3, 8)),
-        *({"surface": "texture", "samples": n} for n in (3, 8)),
-        *({"surface": "texture", "select": other} for other in SELECTIONS if other != "fit"),
-    )
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = ({"samples": 8},)
+    beside: ClassVar[type] = object
 
     def bake(self, stage: Stage) -> None:
-        """Choose the senders of each mesh's vertices for its material; what M_front wants baked."""
+        """Choose the senders of each mesh's vertices for its material."""
         for body in stage.bodies:
             self.map(body)
-        SURFACES[self.surface]().bake(stage)
 
     def map(self, body: Body) -> Entries:
         """The spatial adjacency map of a body at rest."""
@@ -70,8 +61,7 @@ class SpatialAdjacencyMaps:
             lambda: spatial_adjacency_map(stage.gpu, mesh, body.material.profile, self.samples, self.select),
         )
 
-    def passes(self, frame: Frame) -> Diffused:
-        diffused = SURFACES[self.surface]().passes(frame)
+    def M_back(self, frame: Frame, surface: Method) -> Handle | None:
         M_back: Any = None
         for body in frame.stage.bodies:
             plan = self.plan(body)
@@ -88,7 +78,7 @@ class SpatialAdjacencyMaps:
                 M_back_at=self.at_vertices(frame, body, plan),
                 **frame.seen("where_seen", "base_color", "depth"),
             )
-        return replace(diffused, M_back=M_back)
+        return M_back
 
     def plan(self, body: Body) -> Plan | None:
         """What a frame needs of a body's map, on the device. Bodies share it, unless what it holds changes."""
@@ -134,6 +124,35 @@ class SpatialAdjacencyMaps:
                 **({} if M_back is None else {"M_back": M_back}),
             )
         return M_back
+
+
+@dataclass(frozen=True)
+class SpatialAdjacencyMaps(Adjacency):
+    """M_back by the senders of each vertex; M_front by another method with its defaults.
+
+    The paper adds M_back to the irradiance that the surface method then blurs (4.3). Here the two are added as they
+    are: the form factors already are means over the receiving fan (eq. 11), and blurring M_back would scale it by the
+    profile's total.
+    """
+
+    surface: str = field(
+        default="texture", metadata={"unit": "", "choices": tuple(SURFACES), "help": "where M_front is estimated"}
+    )
+
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = (
+        *({"surface": "screen", "samples": n} for n in (3, 8)),
+        *({"surface": "texture", "samples": n} for n in (3, 8)),
+        *({"surface": "texture", "select": other} for other in SELECTIONS if other != "fit"),
+    )
+
+    def bake(self, stage: Stage) -> None:
+        """Choose the senders of each mesh's vertices for its material; what M_front wants baked."""
+        super().bake(stage)
+        SURFACES[self.surface]().bake(stage)
+
+    def passes(self, frame: Frame) -> Diffused:
+        surface = SURFACES[self.surface]()
+        return replace(surface.passes(frame), M_back=self.M_back(frame, surface))
 
 
 @dataclass

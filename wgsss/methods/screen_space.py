@@ -65,7 +65,7 @@ class ScreenSpace:
         M_front: Any = None
         for body in frame.stage.bodies:
             M_front = self.diffuse(frame, body, irradiance, M_front)
-        return Diffused(M_front, irradiance=irradiance)
+        return Diffused(M_front)
 
     def diffuse(self, frame: Frame, body: Body, irradiance: Handle, into: Handle | None) -> Handle:
         """M_front of one body, drawn onto `into`."""

@@ -87,6 +87,9 @@ class TextureSpace:
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:
         """A body's irradiance map, in `lighting.unit`, blurred by each Gaussian of its profile, narrowest first."""
+        return frame.once(("blurs", self, body.index), lambda: self._blurs(frame, body))
+
+    def _blurs(self, frame: Frame, body: Body) -> list[Handle]:
         graph, full = frame.graph, atlas(body, self.map_size)
         irradiance = shared.irradiance_texels(frame, body, self.map_size)
         size = (self.map_size, self.map_size)

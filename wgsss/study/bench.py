@@ -98,12 +98,12 @@ def read(folder: str | Path) -> list[Run]:
 
 def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[Spec]:
     """What is to be measured in a scene, each setting once."""
-    from wgsss.methods import METHODS, make_method
+    from wgsss.methods import METHODS, kind_of, make_method
     from wgsss.reference import REFERENCES
     from wgsss.study.run import Spec, digest
 
     for method in methods or ():
-        if method not in METHODS:
+        if method in REFERENCES:
             raise unknown("method", method, METHODS)
     if reference not in REFERENCES:
         raise unknown("reference", reference, REFERENCES)
@@ -111,7 +111,7 @@ def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], r
     return [
         Spec(scene.name, seen, method, vars(make_method(method, knobs)), step, size, reference)
         for method in dict.fromkeys(methods or METHODS)
-        for step, knobs in enumerate(METHODS[method].sweep)
+        for step, knobs in enumerate(kind_of(method).sweep)
     ]
 
 

@@ -1,0 +1,81 @@
+"""Methods of two parts: a surface, which estimates M_front, and a translucency, which estimates M_back."""
+
+from __future__ import annotations
+
+from dataclasses import field, fields, make_dataclass, replace
+from functools import cache
+from typing import Any, ClassVar, Protocol
+
+from wgsss.errors import InputError
+from wgsss.frame import Frame
+from wgsss.graph import Handle
+from wgsss.methods.method import Diffused, Method
+from wgsss.stage import Stage
+
+
+class Translucency(Protocol):
+    """A frozen dataclass whose fields are the knobs, each with its unit and default."""
+
+    source: ClassVar[str]
+    """the paper"""
+    sweep: ClassVar[tuple[dict[str, Any], ...]]
+    """settings from cheap to dear, beside the default"""
+    beside: ClassVar[type]
+    """the surfaces that it can do with: `object` for any"""
+
+    def bake(self, stage: Stage) -> None:
+        """Compute, or load from the cache, what depends on meshes and materials but not on the frame."""
+
+    def M_back(self, frame: Frame, surface: Method) -> Handle | None:
+        """Declare the passes that estimate M_back, W/m^2 per pixel; None where nothing shines through."""
+
+
+class Pair:
+    """M_front by one technique and M_back by another; the knobs are those of both."""
+
+    parts: ClassVar[tuple[type[Method], type[Translucency]]]
+
+    def bake(self, stage: Stage) -> None:
+        for part in self._made():
+            part.bake(stage)
+
+    def passes(self, frame: Frame) -> Diffused:
+        surface, translucency = self._made()
+        return replace(surface.passes(frame), M_back=translucency.M_back(frame, surface))
+
+    def _made(self) -> tuple[Method, Translucency]:
+        surface, translucency = self.parts
+        return surface(**self._knobs(surface)), translucency(**self._knobs(translucency))
+
+    def _knobs(self, part: Any) -> dict[str, Any]:
+        return {knob.name: getattr(self, knob.name) for knob in fields(part)}
+
+
+@cache
+def pair(surface: type[Method], translucency: type[Translucency]) -> type[Method]:
+    """The method of these two parts.
+
+    Raises InputError where the translucency reads what the surface does not make.
+    """
+    if not issubclass(surface, translucency.beside):
+        raise InputError(
+            f"{translucency.__name__} reads what {translucency.beside.__name__} makes, so that it cannot go with "
+            f"{surface.__name__}"
+        )
+    knobs = [
+        (knob.name, knob.type, field(default=knob.default, metadata=knob.metadata))
+        for part in (surface, translucency)
+        for knob in fields(part)  # type: ignore[arg-type]
+    ]
+    made: type[Method] = make_dataclass(
+        f"{surface.__name__}And{translucency.__name__}",
+        knobs,
+        bases=(Pair,),
+        frozen=True,
+        namespace={
+            "parts": (surface, translucency),
+            "source": "; ".join(dict.fromkeys([surface.source, translucency.source])),
+            "sweep": (*surface.sweep, *translucency.sweep),
+        },
+    )
+    return made
