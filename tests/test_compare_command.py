@@ -78,7 +78,7 @@ def test_lights_of_all_types(tmp_path: Path, capsys):
         (["sphere", "--lights", "some"], "invalid choice: 'some'"),
         (["sphere", "-o", "/no/folder"], "/no/folder: there is no folder '/no'"),
         (["sphere", "-o", "/dev/null"], "/dev/null: this is not a folder"),
-        (["sphere", "--light", "all"], "unknown option '--light'; did you mean '--lights'"),
+        (["sphere", "--light", "all"], "argument --light: 'all' is not a table"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(argv, says, tmp_path: Path, capsys, monkeypatch):

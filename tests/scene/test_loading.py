@@ -351,6 +351,20 @@ def test_a_mesh_is_framed_and_lit_from_both_sides(folder: Path, size_mm: float |
     assert any(isinstance(light, EnvironmentLight) for light in scene.lights)
 
 
+def test_camera_lights_and_material_may_be_given_as_in_a_scene_file(folder: Path) -> None:
+    box = folder / "box.ply"
+    sun = {"kind": "directional", "direction": [0, -1, 0], "irradiance": [1, 2, 3]}
+    lamp = PointLight((1.0, 2.0, 3.0), (1.0, 1.0, 1.0))
+    camera = {"kind": "orthographic", "distance": 10.0, "azimuth": 90.0, "elevation": 0.0, "target": [0, 0, 0]}
+    scene = load_scene(box, camera=camera, lights=[sun, lamp], material={"preset": "ketchup", "roughness": 0.5})
+    assert scene.lights == (DirectionalLight((0, -1, 0), (1, 2, 3)), lamp)
+    np.testing.assert_allclose(scene.camera.eye, [10.0, 0.0, 0.0], atol=1e-12)
+    assert isinstance(scene.camera, OrthographicCamera)
+    assert (scene.objects[0].material.roughness, scene.objects[0].material.eta) == (0.5, MATERIALS["ketchup"].eta)
+    assert load_scene(box).lights == load_scene(box, lights=[]).lights != ()
+    assert "light: unknown key 'intensity'" in refused(box, lights=[{**sun, "intensity": 1}])
+
+
 def test_a_scene_at_a_time_is_a_still(folder: Path) -> None:
     scene = load_scene(write(folder, SCENE))
     still = scene.at(1.0)

@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import re
+import tomllib
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from wgsss.errors import InputError
@@ -16,6 +17,14 @@ if TYPE_CHECKING:
 
 DEFAULT_METHOD = "deon07"
 _SCENE = "a built-in scene (see 'wgsss scenes'), a scene file (.toml) or a mesh (.ply .obj .stl .off .glb .gltf)"
+
+
+_MATERIAL = """of all objects: a measured material, a material file (.toml) or a table as in such a file,
+'{preset = "marble", roughness = 0.5}'"""
+_CAMERA = """instead of the scene's: a table as in a scene file, '{kind = "perspective", eye = [0, 0, 300],
+target = [0, 0, 0]}'"""
+_LIGHT = """instead of the scene's: a table as in a scene file, '{kind = "point", position = [0, 0, 300],
+intensity = [1, 1, 1]}'; may be given again"""
 
 
 class Parser(argparse.ArgumentParser):
@@ -45,9 +54,11 @@ def add_scene(parser: Parser) -> None:
     """The scene, and the choices that go with it."""
     add = parser.add_argument
     add("scene", metavar="SCENE", help=_SCENE)
-    add("--material", metavar="NAME", help="of all objects: a measured material or a material file (.toml)")
+    add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
     add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
+    add("--camera", metavar="TABLE", type=table_of, help=_CAMERA)
+    add("--light", metavar="TABLE", dest="lights", type=table_of, action="append", default=[], help=_LIGHT)
 
 
 def add_method(parser: Parser) -> None:
@@ -63,7 +74,14 @@ def load_scene(args: argparse.Namespace) -> Scene:
     """The scene that the arguments name."""
     from wgsss.scene import load_scene
 
-    return load_scene(args.scene, material=args.material, size_mm=args.size_mm, vertices=args.vertices)
+    return load_scene(
+        args.scene,
+        material=args.material,
+        size_mm=args.size_mm,
+        vertices=args.vertices,
+        camera=args.camera,
+        lights=args.lights,
+    )
 
 
 def make_method(args: argparse.Namespace) -> Method:
@@ -142,6 +160,22 @@ def assignment(text: str) -> tuple[str, str]:
     if not (name and equals and value):
         raise argparse.ArgumentTypeError(f"'{text}' is not KNOB=VALUE, such as map_size=512")
     return name, value
+
+
+def table_of(text: str) -> dict[str, Any]:
+    """A table of TOML in one line."""
+    try:
+        found = tomllib.loads(f"table = {text}")["table"]
+    except tomllib.TOMLDecodeError:
+        found = None
+    if not isinstance(found, dict):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a table such as {{kind = \"orthographic\", height = 200}}")
+    return found
+
+
+def name_or_table(text: str) -> str | dict[str, Any]:
+    """A name, or a table of TOML in one line."""
+    return table_of(text) if text.startswith("{") else text
 
 
 def settings(text: str) -> list[tuple[str, dict[str, str]]]:

@@ -2,31 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from wgsss.errors import InputError, unknown
+from wgsss.scene.camera import Camera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.light import Light
 from wgsss.scene.material import Material
 from wgsss.scene.materialfile import choose_material
 from wgsss.scene.mesh import load_mesh
 from wgsss.scene.scene import Object, Scene
-from wgsss.scene.scenefile import read_scene
+from wgsss.scene.scenefile import camera_of, light_of, read_scene
+from wgsss.scene.tables import Table
 
 
 def load_scene(
     name_or_path: str | Path,
     *,
-    material: str | Path | Material | None = None,
+    material: str | Path | Table | Material | None = None,
     size_mm: float | None = None,
     vertices: int | None = None,
+    camera: Table | Camera | None = None,
+    lights: Sequence[Table | Light] = (),
 ) -> Scene:
     """A built-in scene by its name, a scene file (.toml), or a mesh file with default lights and a camera to frame it.
 
     `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. `size_mm`
     is for a mesh file: the length of its longest side. `vertices` is for a built-in scene: about how many it has.
+    `camera`, and `lights` where there are any, take the place of the scene's. These and the material may be tables, with
+    the keys of a scene file.
+
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """
+    scene = _scene(name_or_path, material, size_mm, vertices)
+    if isinstance(camera, dict):
+        camera = camera_of(camera, "camera")
+    found = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
+    return replace(scene, camera=camera or scene.camera, lights=tuple(found) or scene.lights)
+
+
+def _scene(name_or_path: str | Path, material: Any, size_mm: float | None, vertices: int | None) -> Scene:
     from wgsss.scene.builtin import SCENES
 
     name, path = str(name_or_path), Path(name_or_path)
@@ -39,7 +57,7 @@ def load_scene(
     if vertices is not None and not builtin:
         raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
 
-    chosen = None if material is None else choose_material(material, Path())
+    chosen = None if material is None else choose_material(material, Path(), "material")
     if is_mesh:
         loaded = load_mesh(path, size_mm=size_mm)
         chosen = chosen or choose_material(DEFAULT_MATERIAL, Path())

@@ -20,9 +20,9 @@ from typing import Any
 from wgsss.errors import InputError
 from wgsss.scene import tables
 from wgsss.scene.animation import NONE
-from wgsss.scene.camera import OrthographicCamera, PerspectiveCamera
+from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
-from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
+from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
 from wgsss.scene.material import Maps
 from wgsss.scene.materialfile import choose_material
 from wgsss.scene.mesh import load_mesh
@@ -49,8 +49,8 @@ def read_scene(path: Path) -> Scene:
     objects = tuple(_object(t, place, folder) for t, place in tables.each(table, "object", where))
     if not objects:
         raise InputError(f"{where}: there is no [[object]] to render")
-    lights = tuple(_light(t, place, folder) for t, place in tables.each(table, "light", where))
-    camera = _camera(table["camera"], f"{where}: [camera]") if "camera" in table else framing(objects)
+    lights = tuple(light_of(t, place, folder) for t, place in tables.each(table, "light", where))
+    camera = camera_of(table["camera"], f"{where}: [camera]") if "camera" in table else framing(objects)
     values = {"name": path.stem, **{key: table[key] for key in simple if key in table}}
     scene: Scene = tables.call(
         Scene, {**values, "objects": objects, "lights": lights or DEFAULT_LIGHTS, "camera": camera}, where
@@ -100,16 +100,22 @@ def _motions() -> dict[str, Any]:
     return {re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): c for name, c in classes.items()}
 
 
-def _light(table: Table, where: str, folder: Path) -> Any:
+def light_of(table: Table, where: str, folder: Path) -> Light:
+    """The light of a [[light]]; its file is relative to `folder`. Raises InputError naming `where` and the key."""
     if "file" in table:
         table = {**table, "file": str(tables.file_in(table, "file", where, folder))}
-    return tables.call_kind(table, LIGHTS, where)
+    light: Light = tables.call_kind(table, LIGHTS, where)
+    return light
 
 
-def _camera(table: Any, where: str) -> Any:
+def camera_of(table: Any, where: str) -> Camera:
+    """The camera of a [camera]. Raises InputError naming `where` and the key."""
+    found: Camera
     if not isinstance(table, dict) or "distance" not in table:
-        return tables.call_kind(table, CAMERAS, where)
+        found = tables.call_kind(table, CAMERAS, where)
+        return found
     camera = tables.choose(CAMERAS, table.get("kind"), "kind", where)
     orbit = {key: p for key, p in inspect.signature(camera.orbit).parameters.items() if key != "rest"}
     own = {key: p for key, p in inspect.signature(camera).parameters.items() if key != "eye"}
-    return tables.call(camera.orbit, {k: v for k, v in table.items() if k != "kind"}, where, {**own, **orbit})
+    found = tables.call(camera.orbit, {k: v for k, v in table.items() if k != "kind"}, where, {**own, **orbit})
+    return found
