@@ -58,7 +58,7 @@ def add_scene(parser: Parser) -> None:
     add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
     add("--camera", metavar="TABLE", type=table_of, help=_CAMERA)
-    add("--light", metavar="TABLE", dest="lights", type=table_of, action="append", default=[], help=_LIGHT)
+    add("--light", metavar="TABLE", type=table_of, action="append", default=[], help=_LIGHT)
 
 
 def add_method(parser: Parser) -> None:
@@ -80,7 +80,7 @@ def load_scene(args: argparse.Namespace) -> Scene:
         size_mm=args.size_mm,
         vertices=args.vertices,
         camera=args.camera,
-        lights=args.lights,
+        lights=args.light,
     )
 
 
