@@ -32,8 +32,8 @@ def load_scene(
 
     `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. `size_mm`
     is for a mesh file: the length of its longest side. `vertices` is for a built-in scene: about how many it has.
-    `camera`, and `lights` where there are any, take the place of the scene's own; they and the material may be tables with
-    the keys of a scene file.
+    `camera`, and `lights` where there are any, take the place of the scene's own; they and the material may be tables
+    with the keys of a scene file.
 
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """
