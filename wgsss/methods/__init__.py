@@ -14,14 +14,17 @@ from wgsss.methods.method import Diffused, Method
 from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
 from wgsss.methods.sam import SURFACES, Adjacency, SpatialAdjacencyMaps
+from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
+from wgsss.methods.transmittance import Transmittance
 
-TRANSLUCENCIES: dict[str, type[Translucency]] = {"sam": Adjacency}
+TRANSLUCENCIES: dict[str, type[Translucency]] = {"transmittance": Transmittance, "sam": Adjacency}
 """What estimates M_back. "none" leaves it black."""
 
 METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
     "deon07": TextureSpace,
+    "jimenez15": pair(ScreenSpace, Transmittance),
     "jensen02": PointCloud,
     "sam": SpatialAdjacencyMaps,
 }

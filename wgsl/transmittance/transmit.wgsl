@@ -1,0 +1,118 @@
+// What each light sends through one object to its pixels, by as much of it as the shadow maps tell (Jimenez et al. 2010,
+// Real-Time Realistic Skin Translucency).
+
+import package::units::{Length, Number, Position, Direction, Irradiance};
+import package::mesh::{Surface};
+import package::light::{Light, ShadowView, Incident, incident, cube_face, POINT};
+import package::rho_dt::{rho_dt};
+import package::screen::{position_of_pixel};
+import package::rectangle::{rectangle_corner};
+import package::targets::{RGBA32Float};
+
+struct Params {
+    clip_to_world: mat4x4f,
+    rectangle: vec4f, // where the object may be
+    reach: Length,    // the thickness that the table ends at: no light goes through more
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> through: array<vec3f>; // T over the profile's total, by the square root of the thickness
+@group(0) @binding(3) var where_seen: texture_2d<f32>;
+@group(0) @binding(4) var normal: texture_2d<f32>;
+@group(0) @binding(5) var depth: texture_depth_2d;
+@group(0) @binding(6) var<storage, read> lights: array<Light>;
+@group(0) @binding(7) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(8) var shadow_maps: texture_depth_2d_array;
+@group(0) @binding(9) var rho_dt_table: texture_2d<f32>;
+
+struct Pixel {
+    @location(0) arriving: RGBA32Float, // W/m^2
+}
+
+// The back's irradiance ends where its normal, -n, is this far beyond a right angle to the light: on a real one, which is
+// not parallel to the front, some light arrives there (Jimenez et al. 2010).
+const WRAP: Number = 0.3;
+
+// How far x_o is moved below the surface, in shadow texels per unit of sine. A lookup reaches 1.5 texels to each side:
+// closer to the surface, some would find x_o outside.
+const SHRINK_TEXELS: Number = 2.0;
+
+fn transmittance(thickness: Length) -> vec3f {
+    let last = arrayLength(&through) - 1u;
+    let s = sqrt(clamp(thickness / params.reach, 0.0, 1.0)) * f32(last);
+    let i = min(u32(s), last - 1u);
+    return mix(through[i], through[i + 1u], s - f32(i));
+}
+
+// Weights of three texels by a quadratic B-spline whose middle is `f` texels, -1/2 to 1/2, beyond that of the second.
+fn spline(f: f32) -> vec3f {
+    let a = 0.5 - f;
+    let b = 0.5 + f;
+    return vec3f(0.5 * a * a, 0.75 - f * f, 0.5 * b * b);
+}
+
+// T, of the profile's total, from where a light's rays first meet the scene to x_o, mean over the rays nearby: depths of rays that pass an edge on
+// either side have no mean that lies on a surface.
+fn transmitted_share(light: Light, at: Incident, x_o: Position, n: Direction) -> vec3f {
+    let first = views[light.first_view];
+    let perspective = first.perspective != 0u;
+    let texel = first.texel * select(1.0, at.distance, perspective);
+    let cosine = dot(n, at.direction);
+    let x = x_o - n * (SHRINK_TEXELS * texel * sqrt(max(1.0 - cosine * cosine, 0.0)));
+    let layer = light.first_view + select(0u, cube_face(x - light.position), light.views == 6u);
+    let to_clip = views[layer].world_to_clip;
+    let clip = to_clip * vec4f(x, 1.0);
+    // Along a ray a parallel view's depth grows evenly; a perspective one's is p + q / w, and w grows evenly.
+    let z_row = vec3f(to_clip[0].z, to_clip[1].z, to_clip[2].z);
+    let w_row = vec3f(to_clip[0].w, to_clip[1].w, to_clip[2].w);
+    let p = dot(z_row, w_row);
+    let q = to_clip[3].z - p * to_clip[3].w;
+    let here = clip.z / clip.w;
+    let per_depth = 1.0 / length(z_row);
+    let distance = length(x - light.position);
+    let size = vec2f(textureDimensions(shadow_maps));
+    let place = (vec2f(0.5, -0.5) * clip.xy / clip.w + 0.5) * size;
+    let middle = floor(place);
+    let across = spline(place.x - middle.x - 0.5);
+    let along = spline(place.y - middle.y - 0.5);
+    var total = vec3f(0.0);
+    for (var j = 0; j < 3; j++) {
+        for (var i = 0; i < 3; i++) {
+            let there = clamp(vec2i(middle) + vec2i(i - 1, j - 1), vec2i(0), vec2i(size) - 1);
+            let met = textureLoad(shadow_maps, there, layer, 0);
+            let parallel = (here - met) * per_depth;
+            let thickness = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
+            total += across[i] * along[j] * transmittance(thickness);
+        }
+    }
+    return total;
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return rectangle_corner(i, params.rectangle);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
+    }
+    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let n_specular = textureLoad(normal, texel, 0);
+    let n = normalize(n_specular.xyz);
+    var total = vec3f(0.0);
+    for (var i = 0u; i < arrayLength(&lights); i++) {
+        let light = lights[i];
+        let at = incident(light, x);
+        let cosine = max(WRAP - dot(n, at.direction), 0.0);
+        if light.views == 0u || cosine == 0.0 {
+            continue;
+        }
+        let entering = at.irradiance * (cosine * rho_dt(rho_dt_table, cosine, n_specular.w));
+        total += entering * transmitted_share(light, at, x, n);
+    }
+    return Pixel(vec4f(total, 1.0));
+}

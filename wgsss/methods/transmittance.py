@@ -1,0 +1,116 @@
+"""jimenez15's translucency: transmittance by thickness (Jimenez et al. 2010, Real-Time Realistic Skin Translucency).
+
+At a pixel, the sum over lights of T(d) E. The thickness d is the way, along the light's rays, from where they first
+meet the scene to x_o, by the shadow map; E is what the back receives if it faces the other way than x_o does,
+
+    T(d) = sum_k w_k exp(-d^2 / 2 v_k)        E = max(0.3 - n . l, 0)
+
+times the light's irradiance and rho_dt. T is the integral of the profile over a plane at distance d: that sum where the
+material is one of Gaussians, and of any other profile the integral itself, with no fit. The exponent is that of
+Gaussians of variance v, in mm^2; the shader that is widely copied has exp(-d^2 / v) and a scale set by eye. As in the
+paper, surface diffusion in screen space blurs the sum as if it had entered at the pixels; beside another surface it
+stays sharp.
+
+All that is known of the back is a depth for each ray. What lies in front of an object counts as a part of it, and so
+does the air between: farther than the profile reaches it keeps the light off, as its shadow does; what nearly touches
+lets through what as much of the medium would. Of area lights each part that casts a shadow is a light. The environment
+has no depth map and does not shine through. Where light grazes the surface E is more than 0 on the lit side, too, and d
+next to nothing: thick things gain a seam of light that is not theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wgsss import wgsl
+from wgsss.frame import Frame
+from wgsss.graph import Handle
+from wgsss.methods.method import Method
+from wgsss.methods.screen_space import ScreenSpace, rectangle
+from wgsss.optics import Profile
+from wgsss.stage import Body, Stage
+
+Array = NDArray[np.float64]
+
+_FAINTEST = 1e-5  # share of the profile's total that may go through more than the table ends at
+_ENTRIES = 512
+
+
+@dataclass(frozen=True)
+class Transmittance:
+    """M_back by the thickness that shadow maps tell of."""
+
+    source: ClassVar[str] = "Jimenez et al. 2010, Real-Time Realistic Skin Translucency"
+    sweep: ClassVar[tuple[dict[str, Any], ...]] = ()
+    beside: ClassVar[type] = object
+
+    def bake(self, stage: Stage) -> None:
+        """The table of T of each material."""
+        for body in stage.bodies:
+            self.table(body)
+
+    def table(self, body: Body) -> tuple[float, Any]:
+        """The thickness, mm, that the table of T of a body's material ends at, and its buffer."""
+
+        def make() -> tuple[float, Any]:
+            thickness, through = table(body.material.profile)
+            packed = wgsl.load("transmittance/transmit").layout("array<vec3f>").pack(through)
+            return float(thickness[-1]), body.stage.gpu.buffer(packed)
+
+        return body.stage.shared(("transmittance", id(body.material)), make)
+
+    def M_back(self, frame: Frame, surface: Method) -> Handle | None:
+        if not frame.lighting.views:
+            return None  # the sky alone
+        arriving: Any = None
+        M_back: Any = None
+        for body in frame.stage.bodies:
+            arriving = self.arriving(frame, body, arriving)
+        for body in frame.stage.bodies:
+            if isinstance(surface, ScreenSpace):
+                M_back = surface.diffuse(frame, body, arriving, M_back)
+            else:
+                M_back = frame.graph.draw(
+                    "lambert/reflect",
+                    into=M_back,
+                    size=frame.size,
+                    label="back",
+                    params={"total": body.material.profile.total},
+                    surface=body.surface,
+                    irradiance=arriving,
+                    **frame.seen("where_seen", "base_color"),
+                )
+        return M_back
+
+    def arriving(self, frame: Frame, body: Body, into: Handle | None) -> Handle:
+        """What arrives at a body's pixels from behind, W/m^2, as a share of the profile's total; drawn onto `into`."""
+        reach, through = self.table(body)
+        where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
+        return frame.graph.draw(
+            "transmittance/transmit",
+            into=into,
+            size=frame.size,
+            count=6,
+            params={"reach": reach, **where},
+            through=through,
+            **frame.seen("where_seen", "normal", "depth"),
+            **frame.light_bindings(body),
+        )
+
+
+def table(profile: Profile) -> tuple[Array, Array]:
+    """T over the profile's total (n, 3) at thicknesses (n,), mm, whose square roots are equally spaced from 0; the last
+    is 0.
+
+    A ring of the plane at distance d is farther from x_o by sqrt(r^2 + d^2): the integral over the plane is what leaves
+    farther than d from where light enters.
+    """
+    reach = float(profile.range(_FAINTEST).max()) or 1.0
+    thickness = reach * np.square(np.linspace(0.0, 1.0, _ENTRIES))
+    through = profile.beyond(thickness)
+    through[-1] = 0.0
+    return thickness, through
