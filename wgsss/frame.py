@@ -172,13 +172,24 @@ def _irradiance_pixels(frame: Frame) -> Handle:
     return irradiance
 
 
-def irradiance_texels(frame: Frame, body: Body, map_size: int) -> Handle:
-    """L_d over a body's atlas, in `lighting.unit`, times the base colour's share that is applied before diffusion."""
+def irradiance_texels(
+    frame: Frame, body: Body, map_size: int, *, least_cosine: float = -2.0, planes: Matrix | None = None
+) -> Handle:
+    """L_d over a body's atlas, in `lighting.unit`, times the base colour's share that is applied before diffusion.
+
+    Texels are left empty, with an alpha of 0, where the angle between normal and viewer has a cosine below
+    `least_cosine`, and behind any of six `planes` (6, 4): where dot(plane, (x, 1)) < 0, x in world space, mm.
+    """
     return frame.graph.draw(
         "frame/irradiance_texels",
         size=(map_size, map_size),
         indices=body.indices,
-        params={"unit": frame.lighting.unit},
+        params={
+            "unit": frame.lighting.unit,
+            "least_cosine": least_cosine,
+            "eye": frame.view.eye,
+            "planes": np.zeros((6, 4)) if planes is None else planes,
+        },
         vertices=body.vertices,
         environment=body.environment.irradiance,
         **vars(body.maps),
@@ -205,6 +216,10 @@ def irradiance_points(frame: Frame, body: Body, points: Any, count: int) -> Hand
 
 def specular(frame: Frame) -> Handle:
     """Radiance reflected at the surface, W/(m^2 sr)."""
+    return frame.once("specular", lambda: _specular(frame))
+
+
+def _specular(frame: Frame) -> Handle:
     reflected: Any = None
     for body in frame.stage.bodies:
         params = {

@@ -221,6 +221,16 @@ class Graph:
 
     # running
 
+    def needed(self, *wanted: Handle) -> list[Pass]:
+        """The passes without which these handles would not be written, in declaration order."""
+        read = set(wanted)
+        kept: list[Pass] = []
+        for item in reversed(self.passes):
+            if read & set(item.writes.values()):
+                kept.append(item)
+                read |= set(item.reads.values())
+        return kept[::-1]
+
     def run(self, *wanted: Handle, timed: bool = False) -> None:
         """Run what the wanted handles need, in declaration order.
 
@@ -229,15 +239,9 @@ class Graph:
         """
         import wgpu
 
-        needed = set(wanted)
         for handle in wanted:
             handle.resource.usage |= wgpu.TextureUsage.COPY_SRC if handle.format else wgpu.BufferUsage.COPY_SRC
-        kept: list[Pass] = []
-        for item in reversed(self.passes):
-            if needed & set(item.writes.values()):
-                kept.append(item)
-                needed |= set(item.reads.values())
-        self.ran = kept[::-1]
+        self.ran = self.needed(*wanted)
         chosen = set(self.ran)
         self.culled = [p for p in self.passes if p not in chosen]
         keep = {h.resource for h in wanted}

@@ -47,6 +47,32 @@ class Image:
     metadata: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A frame by one method, as declared: radiance, the image for a display, and `layers`, by AOVS; None is black."""
+
+    radiance: Handle
+    display: Handle
+    layers: dict[str, Handle | None]
+
+
+def draw(frame: shared.Frame, method: Method) -> Drawn:
+    """Declare the passes that draw a frame by a method."""
+    diffused = method.passes(frame)
+    reflected = shared.specular(frame)
+    radiance = shared.composite(frame, diffused.M_front, diffused.M_back, reflected)
+    scene = frame.stage.scene
+    layers = {
+        "irradiance": shared.irradiance_pixels(frame),
+        "M_front": diffused.M_front,
+        "M_back": diffused.M_back,
+        "specular": reflected,
+        "depth": frame.gbuffer.depth,
+        "normal": frame.gbuffer.normal,
+    }
+    return Drawn(radiance, shared.tone_map(frame.graph, radiance, scene.exposure, scene.tone_map), layers)
+
+
 class Renderer:
     """One scene, method and size, from frame to frame.
 
@@ -74,20 +100,9 @@ class Renderer:
             self.stage.pose(time_s)
         graph = Graph(self.gpu)
         frame = shared.begin(graph, self.stage, self.size)
-        diffused = self.method.passes(frame)
-        reflected = shared.specular(frame)
-        radiance = shared.composite(frame, diffused.M_front, diffused.M_back, reflected)
-        scene = self.stage.scene
-        display = shared.tone_map(graph, radiance, scene.exposure, scene.tone_map)
-        handles: dict[str, Handle | None] = {
-            "irradiance": shared.irradiance_pixels(frame),
-            "M_front": diffused.M_front,
-            "M_back": diffused.M_back,
-            "specular": reflected,
-            "depth": frame.gbuffer.depth,
-            "normal": frame.gbuffer.normal,
-        }
-        wanted = {name: handles[name] for name in aovs}
+        drawn = draw(frame, self.method)
+        radiance, display = drawn.radiance, drawn.display
+        wanted = {name: drawn.layers[name] for name in aovs}
         graph.run(radiance, display, *(h for h in wanted.values() if h is not None), timed=timed)
         pixels = graph.read(radiance)
         found = {name: self._aov(graph, frame, name, handle) for name, handle in wanted.items()}
