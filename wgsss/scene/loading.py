@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from wgsss.errors import InputError, unknown
 from wgsss.scene.camera import Camera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
 from wgsss.scene.light import Light
 from wgsss.scene.material import Material
-from wgsss.scene.materialfile import choose_material
+from wgsss.scene.materialfile import Chosen, choose_material
 from wgsss.scene.mesh import load_mesh
 from wgsss.scene.scene import Object, Scene
 from wgsss.scene.scenefile import camera_of, light_of, read_scene
@@ -37,14 +36,15 @@ def load_scene(
 
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """
-    scene = _scene(name_or_path, material, size_mm, vertices)
+    chosen = None if material is None else choose_material(material, Path(), "material")
+    scene = _scene(name_or_path, chosen, size_mm, vertices)
     if isinstance(camera, dict):
         camera = camera_of(camera, "camera")
     found = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
     return replace(scene, camera=camera or scene.camera, lights=tuple(found) or scene.lights)
 
 
-def _scene(name_or_path: str | Path, material: Any, size_mm: float | None, vertices: int | None) -> Scene:
+def _scene(name_or_path: str | Path, chosen: Chosen | None, size_mm: float | None, vertices: int | None) -> Scene:
     from wgsss.scene.builtin import SCENES
 
     name, path = str(name_or_path), Path(name_or_path)
@@ -57,15 +57,21 @@ def _scene(name_or_path: str | Path, material: Any, size_mm: float | None, verti
     if vertices is not None and not builtin:
         raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
 
-    chosen = None if material is None else choose_material(material, Path(), "material")
     if is_mesh:
         loaded = load_mesh(path, size_mm=size_mm)
         chosen = chosen or choose_material(DEFAULT_MATERIAL, Path())
         thing = Object(loaded.mesh, chosen.on(loaded.maps), motion=loaded.motion)
         return Scene(path.stem, (thing,), DEFAULT_LIGHTS, framing([thing]))
     scene: Scene = SCENES[name](vertices) if builtin else read_scene(path)
-    if chosen is None:
-        return scene
+    return scene if chosen is None else _dressed(scene, chosen)
+
+
+def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:
+    """The scene with all objects of another material, as of `load_scene`; their textures stay."""
+    return _dressed(scene, choose_material(material, Path(), "material"))
+
+
+def _dressed(scene: Scene, chosen: Chosen) -> Scene:
     return replace(scene, objects=tuple(replace(o, material=chosen.on(o.material.maps)) for o in scene.objects))
 
 
