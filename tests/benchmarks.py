@@ -18,6 +18,7 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
+from conftest import DATA
 
 from wgsss.frame import begin
 from wgsss.gpu import Gpu, default_gpu
@@ -159,6 +160,28 @@ def octree(gpu: Gpu) -> None:
     print(f"{'  difference, relative RMSE':46}{100 * off:9.2f} %")
 
 
+def screen_pairs(gpu: Gpu) -> None:
+    """Frames of sam and of jimenez15, which diffuse in screen space alike, in turns: at most 1.1 is the goal."""
+    head = DATA / "lee_perry_smith" / "LeePerrySmith.obj"
+    scenes = {"ear": (load_scene("ear"), [(256, 256), SIZE])}
+    if head.is_file():
+        scenes["head"] = (load_scene(head, material="skin1", size_mm=430.0), [SIZE])
+    for name, (scene, sizes) in scenes.items():
+        for size in sizes:
+            ours = Renderer(scene, make_method("sam", {"surface": "screen"}), size, gpu)
+            theirs = Renderer(scene, make_method("jimenez15"), size, gpu)
+            runs: dict[Renderer, list[float]] = {ours: [], theirs: []}
+            for turn in range(27):
+                for renderer in runs if turn % 2 else reversed(runs):
+                    start = time.perf_counter()
+                    renderer.frame(timed=False)
+                    if turn >= 2:  # before, it compiles
+                        runs[renderer].append(time.perf_counter() - start)
+            plain = Figure(runs[theirs])
+            say(f"frame of {name} at {size[0]}x{size[1]} by jimenez15", plain)
+            say("  by sam, surface=screen", Figure(runs[ours]), against=plain)
+
+
 def photons(gpu: Gpu) -> None:
     """Photons a second, those of all channels together, against what the reference is meant to reach."""
     slab = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
@@ -177,4 +200,5 @@ if __name__ == "__main__":
     encoding(device)
     methods(device)
     octree(device)
+    screen_pairs(device)
     photons(device)
