@@ -12,13 +12,15 @@ from scenes import lit
 from wgsss import frame as shared
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.form_factors import form_factors as integrated
+from wgsss.bake.sam.rows import senders
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError
 from wgsss.gpu import LIMITS
 from wgsss.graph import Graph
 from wgsss.methods import sam
 from wgsss.methods.sam_motion import places_at_rest
-from wgsss.scene import MATERIALS, Object, load_scene
+from wgsss.scene import MATERIALS, EnvironmentLight, Mesh, Object, load_scene
 from wgsss.scene.shapes import ear, slab, sphere
 from wgsss.stage import Stage
 
@@ -31,8 +33,8 @@ class Moved:
     period_s: float = 1.0
 
 
-def moving(mesh, apply, material=MARBLE):
-    scene = lit(SIDE, camera=FRONT)
+def moving(mesh, apply, material=MARBLE, light=SIDE):
+    scene = lit(light, camera=FRONT)
     return replace(scene, objects=(Object(mesh, material, motion=Moved(apply)),))
 
 
@@ -44,16 +46,21 @@ class Followed:
         graph = Graph(stage.gpu)
         body = stage.bodies[0]
         M_back = method.at_vertices(shared.begin(graph, stage, (8, 8)), body, method.plan(body))
-        passes = {p.module.name: p for p in graph.passes}
-        read = passes["sam/gather"].reads
-        follows = passes.get("sam/update") or passes["sam/totals"]
-        wanted = [M_back, read["entries"], read["irradiance"], follows.reads["places"]]
-        graph.run(*wanted)
-        M, entries, L, self.places = (graph.read(h) for h in wanted)
-        self.M, self.irradiance = M[:, :3], L[:, :3]
-        self.sender = entries["sender"].reshape(len(M), -1)
-        self.weight = entries["weight"].reshape(*self.sender.shape, 3).astype(float)
-        self.mesh = stage.bodies[0].mesh
+        self.mesh = body.mesh
+        passes = {p.module.name: p.reads for p in graph.passes}
+        read = passes.get("sam/sum") or {**passes["sam/update"], **passes["sam/gather"]}
+        wanted = {name: read[name] for name in ("irradiance", "places", "entries") if name in read}
+        graph.run(M_back, *wanted.values())
+        got = {name: graph.read(handle) for name, handle in wanted.items()}
+        M, self.places = graph.read(M_back), got["places"]
+        self.M, self.irradiance = M[:, :3], got["irradiance"][:, :3]
+        if "entries" in got:
+            entries = got["entries"]
+            self.sender = entries["sender"].reshape(len(M), -1)
+            self.weight = entries["weight"].reshape(*self.sender.shape, 3).astype(float)
+
+
+EVEN = EnvironmentLight((1, 2, 3))
 
 
 def turn(x, time_s):
@@ -70,18 +77,13 @@ def twisted(x, time_s):
     return np.stack([c * x[:, 0] - s * x[:, 2], x[:, 1], s * x[:, 0] + c * x[:, 2] * (1 + time_s)], axis=1)
 
 
-@pytest.mark.parametrize("nodes", [False, True], ids=["vertices", "nodes"])
-def test_rigid_motion_changes_nothing(gpu, monkeypatch, nodes):
-    mesh = sphere(6.0, 400)
-    if nodes:
-        given(monkeypatch, lambda mesh: entries)
-        entries = random_entries(mesh)
-    stage = Stage(gpu, moving(mesh, turn))
+def test_rigid_motion_changes_nothing(gpu):
+    stage = Stage(gpu, moving(sphere(6.0, 400), turn))
     baked = PLAIN.map(stage.bodies[0])
     for time_s in (0.0, 0.4, 0.9):
         found = Followed(stage, time_s)
         np.testing.assert_array_equal(found.sender, baked.sender)
-        np.testing.assert_allclose(found.weight, baked.weight, rtol=1e-2 if nodes else 2e-4, atol=1e-9)
+        np.testing.assert_allclose(found.weight, baked.weight, rtol=2e-4, atol=1e-9)
 
 
 def test_uniform_growth_scales_areas_and_distances(gpu):
@@ -256,41 +258,77 @@ def form_factors(mesh, profile):
     return fan_areas(mesh)[:, None] * profile.reflectance(np.linalg.norm(between, axis=2)) * behind[..., None]
 
 
-@pytest.mark.parametrize("apply", [swollen, twisted])
-def test_weights_of_nodes_grow_as_all_that_arrives(gpu, monkeypatch, apply):
-    mesh = sphere(6.0, 400)
-    entries = random_entries(mesh)
-    given(monkeypatch, lambda mesh: entries)
-    found = Followed(Stage(gpu, moving(mesh, apply)), 0.4)
-    np.testing.assert_array_equal(found.sender, entries.sender)
-    totals = [form_factors(m, MARBLE.profile).sum(axis=1) for m in (mesh, found.mesh)]
-    grown = totals[1] / totals[0]
-    has = (entries.weight > 0.1).all(axis=2)
-    ratio = (found.weight / np.where(has[..., None], entries.weight, 1.0) / grown[:, None])[has]
-    print(np.percentile(grown, [5, 95]), np.percentile(ratio, [1, 50, 99]))
-    assert np.abs(np.median(ratio, axis=0) - 1.0).max() < 0.03
-    assert (np.abs(ratio - 1.0) < 0.15).mean() > 0.95
+@pytest.mark.parametrize("apply", [turn, swollen, twisted])
+def test_maps_of_nodes_sum_all_that_is_behind(gpu, monkeypatch, apply):
+    """Whatever entries there are. In even light, that is the sum of all form factors; at rest the scale makes up for
+    what nodes on both sides of a horizon are off by."""
+    given(monkeypatch, random_entries)
+    for light, time_s, most in ((SIDE, 0.0, 0.06), (SIDE, 0.4, 0.06), (EVEN, 0.0, 0.01), (EVEN, 0.4, 0.035)):
+        found = Followed(Stage(gpu, moving(sphere(6.0, 400), apply, light=light)), time_s)
+        K = form_factors(found.mesh, MARBLE.profile)
+        expected = np.einsum("oic,ic->oc", K, found.irradiance[: len(found.M)])
+        assert rms(found.M - expected) < most * rms(expected)
+        assert np.abs(found.M.mean(axis=0) / expected.mean(axis=0) - 1.0).max() < 0.035
 
 
-@pytest.mark.parametrize(("select", "most"), [("top", 0.1), ("coarse", 1.5), ("fit", 3.0)])
-def test_a_map_that_follows_the_wave_is_nearly_as_good_as_one_baked_anew(gpu, select, most):
-    """Against the sum over all vertices on the back side, over two seconds: half a period."""
-    method, scene = replace(PLAIN, select=select), load_scene("wave", vertices=600)
+def test_fans_that_nearly_touch_are_integrated_at_rest(gpu, monkeypatch):
+    """A disc of 0.3 mm, whose fans are 0.7 mm wide: there areas times R_d are too much. How much stays as it bends."""
+    ball, profile = sphere(6.0, 500), MARBLE.profile
+    mesh = Mesh(ball.positions * (1.0, 1.0, 0.025), ball.faces)
+    given(monkeypatch, lambda mesh: replace(random_entries(mesh), tree=senders(mesh, 3.0).tree))
+    stage = Stage(gpu, moving(mesh, twisted))
+    for time_s in (0.0, 0.2):
+        found = Followed(stage, time_s)
+        taken = form_factors(found.mesh, profile)
+        o, i = np.nonzero(taken.any(axis=2))
+        K = np.zeros_like(taken)
+        K[o, i] = integrated(gpu, found.mesh, profile, np.stack([o, i], axis=1))
+        light = found.irradiance[: len(found.M)]
+        expected, without = (np.einsum("oic,ic->oc", each, light) for each in (K, taken))
+        assert rms(found.M - expected) < 0.035 * rms(expected) < 0.5 * rms(without - expected)
+
+
+@pytest.mark.parametrize(
+    ("select", "samples", "most"), [("top", 3, 0.1), ("coarse", 3, 1.5), ("fit", 3, 1.5), ("fit", 8, 1.5)]
+)
+def test_a_map_that_follows_the_wave_is_nearly_as_good_as_one_baked_anew(gpu, monkeypatch, select, samples, most):
+    """Against the sum over all vertices behind, over two seconds: half a period, at vertices and in pixels."""
+    monkeypatch.setattr(sam, "KEPT_A_SECOND", 0.0)
+    method, scene = replace(PLAIN, select=select, samples=samples), load_scene("wave", vertices=600)
     stage, profile = Stage(gpu, scene), scene.objects[0].material.profile
     lost = []
-    for frame in range(21):
+    for frame in range(0, 21, 5 if select == "fit" else 1):  # senders move from frame to frame
         found = Followed(stage, frame / 10, method)
         if frame % 5:
             continue
-        graph = Graph(gpu)
         still = Stage(gpu, scene.at(frame / 10))
-        body = still.bodies[0]
+        everything = np.einsum("oic,ic->oc", form_factors(found.mesh, profile), light_at_vertices(still))
+        graph, body = Graph(gpu), still.bodies[0]
         anew = method.at_vertices(shared.begin(graph, still, (8, 8)), body, method.plan(body))
         graph.run(anew)
-        everything = np.einsum("oic,ic->oc", form_factors(found.mesh, profile), light_at_vertices(still))
-        lost.append(psnr(graph.read(anew)[:, :3], everything) - psnr(found.M, everything))
-    print(select, lost)
-    assert max(lost) < most
+        whole, *both = (seen(still, M) for M in (everything, graph.read(anew)[:, :3], found.M))
+        lost.append([np.subtract(*(psnr(M[part], whole[part]) for M in both)) for part in ("vertices", "pixels")])
+    print(select, samples, np.round(lost, 2).tolist())
+    assert np.max(lost) < most
+
+
+def seen(stage, M):
+    """M_back at the vertices of the one object, and in the pixels that show it."""
+    graph, body = Graph(stage.gpu), stage.bodies[0]
+    frame = shared.begin(graph, stage, (128, 128))
+    drawn = graph.draw(
+        "sam/show",
+        size=frame.size,
+        indices=body.indices,
+        params={"world_to_clip": frame.view.world_to_clip},
+        surface=body.surface,
+        vertices=body.vertices,
+        M_back_at=stage.gpu.buffer(np.column_stack([M, np.ones(len(M))]).astype(np.float32)),
+        **frame.seen("where_seen", "base_color", "depth"),
+    )
+    graph.run(drawn)
+    image = graph.read(drawn)
+    return {"vertices": M, "pixels": image[image.any(axis=2)][:, :3]}
 
 
 def test_topology_that_changes_is_an_error_that_names_the_frame(gpu):

@@ -19,6 +19,7 @@ from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
 from wgsss.methods.sam_motion import follow
 from wgsss.methods.sam_senders import Plan, make_plan, over_nodes
+from wgsss.methods.sam_sum import sum_behind
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.stage import Body, Stage
@@ -94,13 +95,16 @@ class Adjacency:
         last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(np.zeros((V, 4), np.float32))))
         passed = last.passed(stage.time_s)
         points = _points(body, plan)
-        entries, area = [block.entries for block in plan.blocks], plan.area
+        kept = KEPT_A_SECOND**passed if passed > 0.0 else 0.0
+        entries = [block.entries for block in plan.blocks]
         if body.rest.motion is not None:
-            entries, area = follow(graph, body, plan, points, anew=passed == 0.0)
+            if plan.nodes:
+                return sum_behind(frame, body, plan, points, last.M_back, kept)
+            entries = follow(graph, body, plan, points, anew=passed == 0.0)
         senders, nodes = len(plan.points.face), plan.nodes
         blended = 0 if plan.blends is None else nodes
         irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended)
-        irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=area)
+        irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=plan.area)
         if plan.blends is not None and plan.entries.blend is not None:
             irradiance = graph.dispatch(
                 "sam/blends",
@@ -109,7 +113,6 @@ class Adjacency:
                 blends=plan.blends,
                 irradiance=irradiance,
             )
-        kept = KEPT_A_SECOND**passed if passed > 0.0 else 0.0
         params = {"kept": kept, "samples": samples, "senders": senders, "means": blended}
         M_back: Any = None
         for block, of_block in zip(plan.blocks, entries, strict=True):

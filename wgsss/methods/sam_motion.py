@@ -1,14 +1,14 @@
 """Spatial adjacency maps of meshes that deform (Maisch & Ropinski 2017, 3.4): the form factors of senders follow areas
-and distances, and senders give way to better neighbours. Where they are nodes, which stand for all that is behind a
-vertex, weights follow the sum of all its form factors.
+and distances, and senders give way to better neighbours. For maps of nodes see `sam_sum`.
 
-What drifts is which parts of the far side count more: senders only climb to better neighbours, and nodes keep their
-shares. Nothing adds up over time: as the rest pose comes back, so do the senders and weights that were baked for it.
+What drifts is which parts of the far side count more, since senders only climb to better neighbours. It does not add up
+over time: as the rest pose comes back, so do the senders and weights that were baked for it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,8 @@ import numpy.typing as npt
 from wgsss import wgsl
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.fans import adjacency, fan_areas
-from wgsss.graph import Graph, Handle
-from wgsss.methods.sam_senders import Block, Plan, over_nodes
+from wgsss.graph import Graph
+from wgsss.methods.sam_senders import Plan, over_nodes
 from wgsss.optics import Profile
 from wgsss.scene import Mesh
 from wgsss.stage import Body
@@ -28,7 +28,6 @@ Array = npt.NDArray[Any]
 _LEAST = 1e-36  # 1/mm^2: R_d may underflow, the logarithm of its table must not
 _TABLE = 1024
 _NEIGHBOURS = 6  # of a sample
-_LEVELS = 16  # of wgsl/sam/totals.wgsl: 4^16 vertices
 _NEAREST, _FARTHEST = 1e-4, 4.0  # of the table, in diagonals of the mesh: 0.1 % apart or less where R_d counts
 
 
@@ -42,8 +41,6 @@ class Deforming:
     """buffer of u32: where the triangles of each of the map's points begin in `corners`"""
     corners: Any
     """buffer of u32: points, three to a triangle"""
-    adjacency: Any
-    """buffer of u32: where each sender's neighbours begin, behind which they are; None where there is a tree"""
     table: Any
     """buffer of vec4f: log2 of R_d"""
     low: float
@@ -52,21 +49,25 @@ class Deforming:
     """of the table, each time that squared distances double"""
 
 
-def deforming(body: Body, entries: Entries) -> Deforming:
-    """Upload what a body's map needs to follow its motion."""
-    gpu, mesh = body.stage.gpu, body.rest.mesh
-    layout = wgsl.load("sam/fans").layout("array<Place>")
-    starts, corners = _triangles(mesh, entries)
-    low, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
-    return Deforming(
-        gpu.buffer(layout.pack(places_at_rest(mesh, entries))),
-        gpu.buffer(starts.astype(np.uint32)),
-        gpu.buffer(corners.astype(np.uint32)),
-        gpu.buffer(_neighbours(mesh, entries)) if entries.tree is None else None,
-        gpu.buffer(table.astype(np.float32)),
-        low,
-        steps,
-    )
+def deforming(body: Body, plan: Plan) -> Deforming:
+    """What a body's map needs to follow its motion, uploaded once."""
+
+    def make() -> Deforming:
+        gpu, mesh = body.stage.gpu, body.rest.mesh
+        layout = wgsl.load("sam/fans").layout("array<Place>")
+        starts, corners = _triangles(mesh, plan.entries)
+        low, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
+        return Deforming(
+            gpu.buffer(layout.pack(places_at_rest(mesh, plan.entries))),
+            gpu.buffer(starts.astype(np.uint32)),
+            gpu.buffer(corners.astype(np.uint32)),
+            gpu.buffer(table.astype(np.float32)),
+            low,
+            steps,
+        )
+
+    found: Deforming = body.stage.shared(("deforming", id(plan)), make)
+    return found
 
 
 def _neighbours(mesh: Mesh, entries: Entries) -> Array:
@@ -135,30 +136,38 @@ def _triangles(mesh: Mesh, entries: Entries) -> tuple[Array, Array]:
     return 3 * np.append(0, np.cumsum(count)), faces.ravel()
 
 
-def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> tuple[list[Any], Any]:
-    """The entries of a body as posed, by block, and the areas of its senders' fans.
+def posed(graph: Graph, body: Body, plan: Plan, points: Any) -> SimpleNamespace:
+    """Where a map's points are and, behind them, its nodes, and the areas of the points' fans: `places` and `area`.
+
+    `points`: a buffer of array<Vertex>, the plan's points as posed.
+    """
+    held = deforming(body, plan)
+    size = len(plan.points.face) + plan.nodes
+    found = graph.dispatch("sam/fans", size=size, points=points, starts=held.starts, corners=held.corners)
+    return SimpleNamespace(places=over_nodes(graph, plan, "sam/places", "places", places=found.places), area=found.area)
+
+
+def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> list[Any]:
+    """The entries of a body as posed, by block, where their senders are no nodes.
 
     Args:
         points: a buffer of array<Vertex>: the plan's points as posed.
         anew: from the senders at rest, and not from those of the last frame.
     """
-    entries = plan.entries
-    kept: Deforming = body.stage.shared(("deforming", id(plan)), lambda: deforming(body, entries))
-    size = len(plan.points.face) + plan.nodes
-    posed = graph.dispatch("sam/fans", size=size, points=points, starts=kept.starts, corners=kept.corners)
-    places = over_nodes(graph, plan, "sam/places", "places", places=posed.places)
-    if entries.tree is not None:
-        return _grown(graph, body, plan, kept, places), posed.area
+    entries, held = plan.entries, deforming(body, plan)
+    adjacency = body.stage.shared(
+        ("adjacency", id(plan)), lambda: body.stage.gpu.buffer(_neighbours(body.rest.mesh, entries))
+    )
     params = {
-        "low": kept.low,
-        "steps": kept.steps,
+        "low": held.low,
+        "steps": held.steps,
         "samples": entries.sender.shape[1],
         "receivers": 0 if entries.samples is None else entries.senders,
         "anew": anew,
         "even": entries.samples is not None,
     }
-    bindings = {"places": places, "rest": kept.rest, "adjacency": kept.adjacency, "table": kept.table}
-    found = [
+    places = posed(graph, body, plan, points).places
+    return [
         graph.dispatch(
             "sam/update",
             size=(block.count, entries.sender.shape[1]),
@@ -166,44 +175,10 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
             vertices=block.vertices,
             at_rest=block.entries,
             moved=block.moved,
-            **bindings,
+            places=places,
+            rest=held.rest,
+            adjacency=adjacency,
+            table=held.table,
         )
         for block in plan.blocks
     ]
-    return found, posed.area
-
-
-def _grown(graph: Graph, body: Body, plan: Plan, kept: Deforming, places: Handle) -> list[Any]:
-    """The entries of a map of nodes, by block: those at rest, times what the sum of all form factors has grown by."""
-    samples = plan.entries.sender.shape[1]
-
-    def at_rest() -> list[Any]:
-        once = Graph(body.stage.gpu)
-        totals = [_totals(once, plan, block, kept, kept.rest) for block in plan.blocks]
-        once.run(*totals)
-        return [body.stage.gpu.buffer(once.read(handle)) for handle in totals]
-
-    return [
-        graph.dispatch(
-            "sam/grow",
-            size=block.count * samples,
-            params={"samples": samples},
-            at_rest=block.entries,
-            totals_at_rest=rest,
-            totals=_totals(graph, plan, block, kept, places),
-        )
-        for block, rest in zip(plan.blocks, body.stage.shared(("totals", id(plan)), at_rest), strict=True)
-    ]
-
-
-def _totals(graph: Graph, plan: Plan, block: Block, kept: Deforming, places: Any) -> Handle:
-    """A buffer of vec4f: of each vertex of a block, the sum of its form factors from behind."""
-    tree = plan.entries.tree
-    assert tree is not None
-    levels = np.zeros((_LEVELS, 4), np.uint32)
-    levels[: len(tree.levels) - 1, 0] = plan.entries.senders + tree.levels[:-1]
-    params = {"levels": levels, "top": len(tree.levels) - 2, "low": kept.low, "steps": kept.steps}
-    found: Handle = graph.dispatch(
-        "sam/totals", size=block.count, params=params, places=places, table=kept.table, vertices=block.vertices
-    )
-    return found
