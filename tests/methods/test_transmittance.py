@@ -173,7 +173,7 @@ def test_the_sky_alone_costs_nothing(gpu):
 
 def test_what_is_far_in_front_keeps_the_light_off(gpu):
     sheet = Object(plane(side=40.0, y=-40.0), MATTE)
-    assert through(gpu, lit(UP, mesh=plate(1.0), material=SKIN, camera=ABOVE, extra=(sheet,))).max() == 0
+    assert through(gpu, lit(UP, mesh=plate(1.0), material=SKIN, camera=ABOVE, extra=(sheet,))).max() < 1e-8
 
 
 def test_what_nearly_touches_counts_as_a_part(gpu):

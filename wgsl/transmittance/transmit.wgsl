@@ -38,9 +38,9 @@ const WRAP: Number = 0.3;
 // closer to the surface, some would find x_o outside.
 const SHRINK_TEXELS: Number = 2.0;
 
-fn transmittance(thickness: Length) -> vec3f {
+fn transmittance(d: Length) -> vec3f {
     let last = arrayLength(&through) - 1u;
-    let s = sqrt(clamp(thickness / params.reach, 0.0, 1.0)) * f32(last);
+    let s = sqrt(clamp(d / params.reach, 0.0, 1.0)) * f32(last);
     let i = min(u32(s), last - 1u);
     return mix(through[i], through[i + 1u], s - f32(i));
 }
@@ -52,9 +52,9 @@ fn spline(f: f32) -> vec3f {
     return vec3f(0.5 * a * a, 0.75 - f * f, 0.5 * b * b);
 }
 
-// T, of the profile's total, from where a light's rays first meet the scene to x_o, mean over the rays nearby: depths of rays that pass an edge on
-// either side have no mean that lies on a surface.
-fn transmitted_share(light: Light, at: Incident, x_o: Position, n: Direction) -> vec3f {
+// From where a light's rays first meet the scene to x_o, along them: mean over those nearby, by weights that keep planes
+// as they are. 0 where they meet nothing before x_o.
+fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length {
     let first = views[light.first_view];
     let perspective = first.perspective != 0u;
     let texel = first.texel * select(1.0, at.distance, perspective);
@@ -76,14 +76,14 @@ fn transmitted_share(light: Light, at: Incident, x_o: Position, n: Direction) ->
     let middle = floor(place);
     let across = spline(place.x - middle.x - 0.5);
     let along = spline(place.y - middle.y - 0.5);
-    var total = vec3f(0.0);
+    var total = 0.0;
     for (var j = 0; j < 3; j++) {
         for (var i = 0; i < 3; i++) {
             let there = clamp(vec2i(middle) + vec2i(i - 1, j - 1), vec2i(0), vec2i(size) - 1);
             let met = textureLoad(shadow_maps, there, layer, 0);
             let parallel = (here - met) * per_depth;
-            let thickness = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
-            total += across[i] * along[j] * transmittance(thickness);
+            let found = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
+            total += across[i] * along[j] * clamp(found, 0.0, params.reach);
         }
     }
     return total;
@@ -112,7 +112,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
             continue;
         }
         let entering = at.irradiance * (cosine * rho_dt(rho_dt_table, cosine, n_specular.w));
-        total += entering * transmitted_share(light, at, x, n);
+        total += entering * transmittance(thickness(light, at, x, n));
     }
     return Pixel(vec4f(total, 1.0));
 }
