@@ -4,10 +4,14 @@ import package::units::{Number};
 import package::mesh::{Vertex, Surface, bent_normal, color_before};
 import package::light::{Light, ShadowView, incident, shadow, cube_face};
 import package::irradiance::{transmitted, transmitted_environment};
+import package::screen::{direction_to_eye};
 import package::targets::{RGBA16Float};
 
 struct Params {
-    unit: f32, // W/m^2 that a value of 1 stands for
+    unit: f32,                // W/m^2 that a value of 1 stands for
+    least_cosine: Number,     // of the angle between normal and viewer, at which texels are lit; -2 for all
+    eye: vec4f,               // xyz, 1: where the camera is; xyz, 0: the direction towards it
+    planes: array<vec4f, 6>,  // texels behind any of them are not lit
 }
 
 @group(0) @binding(0) var<uniform> surface: Surface;
@@ -34,7 +38,7 @@ struct Varying {
 }
 
 struct Texel {
-    @location(0) irradiance: RGBA16Float, // in params.unit: L_d times the base colour's share before diffusion; 1 where covered
+    @location(0) irradiance: RGBA16Float, // in params.unit: L_d times the base colour's share before diffusion; 1 where lit
 }
 
 @vertex
@@ -46,16 +50,31 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky);
 }
 
+// Whether a part of the texel about x faces the viewer enough, in front of all planes.
+fn is_wanted(x: Position, n: Direction) -> bool {
+    let cosine = dot(n, direction_to_eye(params.eye, x));
+    var wanted = cosine + fwidth(cosine) >= params.least_cosine;
+    for (var i = 0u; i < 6u; i++) {
+        wanted = wanted && dot(params.planes[i], vec4f(x, 1.0)) >= 0.0;
+    }
+    return wanted;
+}
+
 @fragment
 fn fs(in: Varying) -> Texel {
     let x = in.position;
     let dx = dpdx(x); // the texel's sides: what it holds is the mean over them, or a shadow's edge would move by half a texel
     let dy = dpdy(x);
-    let n = bent_normal(normalize(in.normal), x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
+    let n_s = normalize(in.normal);
+    let wanted = is_wanted(x, n_s);
+    let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
     var irradiance = transmitted_environment(environment, linear_wrap_u, n, in.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
+        if !wanted {
+            break;
+        }
         let light = lights[i];
         let at = incident(light, x);
         if dot(n, at.direction) <= 0.0 {
@@ -67,6 +86,9 @@ fn fs(in: Varying) -> Texel {
             lit = shadow(views[layer], layer, at, x, n, dx, dy, shadow_maps, compare_less);
         }
         irradiance += transmitted(at, n, specular, lit, rho_dt_table);
+    }
+    if !wanted {
+        discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
     }
     return Texel(vec4f(irradiance / params.unit * color_before(surface, color), 1.0));
 }

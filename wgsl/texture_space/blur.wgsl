@@ -7,8 +7,8 @@
 
 import package::units::{Area};
 import package::charts::{INSIDE, Seam, across, id_at, settled};
-import package::screen::{screen_corner};
 import package::targets::{RGBA16Float};
+import package::tiles::{tile_corner};
 
 struct Params {
     axis: vec3f,      // the first direction is across it
@@ -16,6 +16,7 @@ struct Params {
     variance: Area,   // of the Gaussian
     reached: Area,    // of the last one, which the source has been blurred by; 0 for the irradiance
     finer: f32,       // texels of the source per texel of what is drawn
+    tile: f32,        // side of a tile, of the map
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -25,6 +26,7 @@ struct Params {
 @group(0) @binding(4) var gradient_v: texture_2d<f32>;
 @group(0) @binding(5) var ids: texture_2d<u32>;
 @group(0) @binding(6) var<storage, read> seams: array<Seam>;
+@group(0) @binding(7) var tiles: texture_2d<u32>;
 
 struct Texel {
     @location(0) blurred: RGBA16Float,
@@ -43,7 +45,7 @@ const HALVING: f32 = 0.25;     // reading a larger map between its texels
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return tile_corner(i, tiles, params.tile);
 }
 
 // Whether a place is in the gutter of a chart, given by its id; what charts that are close have between them is the
@@ -119,11 +121,12 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     let spread = variance / (spacing * spacing);
     // Samples of a Gaussian much narrower than their spacing have less variance than it: three that have as much.
     let exponent = select(-0.5 / spread, log(0.5 * spread / (1.0 - spread)), spread < 0.25);
+    var total = textureSampleLevel(source, linear_clamp, home, 0.0);
+    let empty = id == 0u || total.a == 0.0; // outside the charts, or not lit
     var taps = 0.0; // where nothing is drawn, or the Gaussian is narrower than a texel
-    if id != 0u && variance > 0.0 {
+    if !empty && variance > 0.0 {
         taps = clamp(ceil(REACH * sqrt(variance) / spacing), 1.0, MAX_TAPS);
     }
-    var total = textureSampleLevel(source, linear_clamp, home, 0.0);
     // Apart, since on CPUs a branch costs all lanes what one of them takes: taps that stay in the chart, taps that may not.
     let clear = min(floor(u.w / (spacing * scale)), taps);
     for (var k = 1.0; k <= clear; k += 1.0) {
@@ -137,7 +140,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
         let step = texels_per_mm * (spacing * k / size);
         total += exp(exponent * k * k) * textureSampleLevel(source, linear_clamp, walk(home, step), 0.0);
     }
-    if id == 0u {
+    if empty {
         discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
     }
     return Texel(vec4f(total.rgb / max(total.a, 1e-4), 1.0)); // alpha: 1 where the source has a value

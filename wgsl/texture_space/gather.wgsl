@@ -2,11 +2,12 @@
 // (Mikkelsen 2009, 3.4, step 4a).
 
 import package::mesh::{Surface, color_after};
-import package::screen::{screen_corner};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     weights: array<vec4f, 6>, // rgb of each Gaussian, narrowest first
+    rectangle: vec4f,         // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -27,7 +28,7 @@ struct Pixel {
 
 // A map read through the cubic B-spline, as four bilinear lookups. Where a Gaussian spans about a texel, bilinear
 // interpolation alone would miss it by up to a few per cent between the texels; the spline blurs, but equally everywhere,
-// so that the blur before can make up for it.
+// so that the blur before can make up for it. Texels without a value do not count.
 fn smooth_sample(map: texture_2d<f32>, linear_clamp: sampler, uv: vec2f) -> vec3f {
     let size = vec2f(textureDimensions(map));
     let p = uv * size - 0.5;
@@ -39,16 +40,17 @@ fn smooth_sample(map: texture_2d<f32>, linear_clamp: sampler, uv: vec2f) -> vec3
     let low = w0 + w1; // of the two texels on the lower side
     let a = (floor(p) - 0.5 + w1 / low) / size;
     let b = (floor(p) + 1.5 + w3 / (1.0 - low)) / size;
-    let upper = mix(textureSampleLevel(map, linear_clamp, b, 0.0).rgb,
-                    textureSampleLevel(map, linear_clamp, vec2f(a.x, b.y), 0.0).rgb, low.x);
-    let lower = mix(textureSampleLevel(map, linear_clamp, vec2f(b.x, a.y), 0.0).rgb,
-                    textureSampleLevel(map, linear_clamp, a, 0.0).rgb, low.x);
-    return mix(upper, lower, low.y);
+    let upper = mix(textureSampleLevel(map, linear_clamp, b, 0.0),
+                    textureSampleLevel(map, linear_clamp, vec2f(a.x, b.y), 0.0), low.x);
+    let lower = mix(textureSampleLevel(map, linear_clamp, vec2f(b.x, a.y), 0.0),
+                    textureSampleLevel(map, linear_clamp, a, 0.0), low.x);
+    let mean = mix(upper, lower, low.y);
+    return mean.rgb / max(mean.a, 1e-4);
 }
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -12,16 +12,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
+from wgsss import wgsl
 from wgsss.bake.charts import Charts
 from wgsss.bake.charts import charts as make_charts
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
+from wgsss.methods.screen_space import rectangle
 from wgsss.optics import SumOfGaussians, fit_shared_gaussians
 from wgsss.stage import Body, Stage
 
 SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
 MOST_HALVINGS = 2  # smaller maps would lose whole charts
+GUTTER = 3  # texels around a chart, as in wgsl/bake/gutter.wgsl
 _SLOTS = 6  # of wgsl/texture_space/gather.wgsl
 # The directions of a separable blur are undefined where the surface faces the axis that they turn about. With another
 # axis for each Gaussian, no place is undefined for all.
@@ -49,15 +52,22 @@ class TextureSpace:
     def sizes(self, body: Body) -> list[int]:
         """The size of the map that each Gaussian is applied on: halved, at most twice, while its sigma spans enough
         texels, since a blurred map has no detail to lose."""
-        surface, mesh = body.unwrap(), body.rest.mesh
-        corners = surface.atlas[surface.faces].astype(np.float64)
-        area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 2
-        uv_per_mm = np.sqrt(area / mesh.area)
         found = []
         for sigma in np.sqrt(self.profile(body).variances):
-            halvings = np.log2(max(sigma * uv_per_mm * self.map_size / SIGMA_TEXELS, 1.0))
+            halvings = np.log2(max(sigma * self.texels_per_mm(body) / SIGMA_TEXELS, 1.0))
             found.append(max(self.map_size >> min(int(halvings), MOST_HALVINGS), 1))
         return found
+
+    def texels_per_mm(self, body: Body) -> float:
+        """Of a body's irradiance map: the root of how many texels a mm^2 has, at rest."""
+
+        def uv_per_mm() -> float:
+            surface = body.unwrap()
+            corners = surface.atlas[surface.faces].astype(np.float64)
+            area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 2
+            return float(np.sqrt(area / body.rest.mesh.area))
+
+        return self.map_size * body.stage.shared(("uv per mm", id(body.rest.mesh)), uv_per_mm)
 
     def profile(self, body: Body) -> SumOfGaussians:
         """The sum of Gaussians of a body's material: its own where it has at most as many, shared by the
@@ -70,40 +80,68 @@ class TextureSpace:
     def passes(self, frame: Frame) -> Diffused:
         M_front: Any = None
         for body in frame.stage.bodies:
-            weights = np.zeros((_SLOTS, 4))
-            blurred = self.blurs(frame, body)
-            weights[: len(blurred), :3] = self.profile(body).weights * frame.lighting.unit
-            maps: dict[str, Any] = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
-            M_front = frame.graph.draw(
-                "texture_space/gather",
-                into=M_front,
-                size=frame.size,
-                params={"weights": weights},
-                surface=body.surface,
-                **maps,
-                **frame.seen("where_seen", "base_color"),
-            )
+            if maps := self.maps(frame, body):
+                M_front = self._gather(frame, body, maps, M_front)
+        if M_front is None:  # nothing is in the image
+            M_front = self._gather(frame, frame.stage.bodies[0], [_black(frame.stage)], None)
         return Diffused(M_front)
+
+    def maps(self, frame: Frame, body: Body) -> list[Handle]:
+        """What a body's pixels are gathered from: its blurred maps, narrowest Gaussian first; none if it has none."""
+        return self.blurs(frame, body)
+
+    def _gather(self, frame: Frame, body: Body, maps: list[Any], into: Handle | None) -> Any:
+        """M_front of a body, drawn onto `into`: the sum of its maps by the profile's weights."""
+        weights = np.zeros((_SLOTS, 4))
+        weights[: len(maps), :3] = self.profile(body).weights[: len(maps)] * frame.lighting.unit
+        slots: dict[str, Any] = {f"blurred_{i}": maps[min(i, len(maps) - 1)] for i in range(_SLOTS)}
+        return frame.graph.draw(
+            "texture_space/gather",
+            into=into,
+            size=frame.size,
+            count=6,
+            params={"weights": weights, "rectangle": rectangle(frame, body)},
+            surface=body.surface,
+            **slots,
+            **frame.seen("where_seen", "base_color"),
+        )
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:
         """A body's irradiance map, in `lighting.unit`, blurred by each Gaussian of its profile, narrowest first."""
-        return frame.once(("blurs", self, body.index), lambda: self._blurs(frame, body))
 
-    def _blurs(self, frame: Frame, body: Body) -> list[Handle]:
-        graph, full = frame.graph, atlas(body, self.map_size)
-        irradiance = shared.irradiance_texels(frame, body, self.map_size)
-        size = (self.map_size, self.map_size)
-        blurred = graph.draw("texture_space/dilate", size=size, source=irradiance, ids=full.ids, seams=full.seams)
+        def make() -> list[Handle]:
+            return self.blur(frame, body, shared.irradiance_texels(frame, body, self.map_size))
+
+        return frame.once(("blurs", self, body.index), make)
+
+    def blur(self, frame: Frame, body: Body, irradiance: Handle, *, sparse: bool = False) -> list[Handle]:
+        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first.
+
+        Texels without a value stay so, and do not count where others have one. If they are many, the map is `sparse`,
+        and only tiles with a value are drawn.
+        """
+        graph, full, sizes = frame.graph, atlas(body, self.map_size), self.sizes(body)
+        tile, covered = self._tiles(frame, irradiance, min(sizes)) if sparse else _one_tile(frame.stage)
+        blurred = graph.draw(
+            "texture_space/dilate",
+            size=(self.map_size, self.map_size),
+            params={"tile": tile},
+            source=irradiance,
+            ids=full.ids,
+            seams=full.seams,
+            **covered,
+        )
         found, reached = [], 0.0
-        for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, self.sizes(body), strict=True)):
+        for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, sizes, strict=True)):
             charts = atlas(body, map_size)
-            widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size}
+            widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size, "tile": tile}
             for direction in (0, 1):
                 blurred = graph.draw(
                     "texture_space/blur",
                     size=(map_size, map_size),
                     label=f"{variance:.3g} mm2 {'uv'[direction]}",
                     params={"axis": _AXES[k % 3], "direction": direction, **widths},
+                    **covered,
                     source=blurred,
                     gradient_u=charts.gradient_u,
                     gradient_v=charts.gradient_v,
@@ -114,8 +152,30 @@ class TextureSpace:
             found.append(blurred)
         return found
 
+    def _tiles(self, frame: Frame, irradiance: Handle, smallest: int) -> tuple[float, dict[str, Any]]:
+        """The side of a tile, of the map, and what draws those that have a value on maps down to the `smallest`."""
+        side = wgsl.load("tiles").constants["TILE"]
+        across = -(-self.map_size // side)
+        tiles = frame.graph.draw(
+            "texture_space/tiles",
+            size=(across, across),
+            constants={"REACH": GUTTER * -(-self.map_size // smallest)},
+            source=irradiance,
+        )
+        return side / self.map_size, {"count": 6 * across * across, "tiles": tiles}
+
+
+def _one_tile(stage: Stage) -> tuple[float, dict[str, Any]]:
+    """As `_tiles`, for all of the map."""
+    tiles = stage.shared("one tile", lambda: stage.gpu.texture(np.ones((1, 1)), "r32uint"))
+    return 1.0, {"count": 6, "tiles": tiles}
+
 
 def atlas(body: Body, size: int) -> Charts:
     """A body's charts on maps of `size` texels a side."""
     surface, mesh, stage = body.unwrap(), body.rest.mesh, body.stage
     return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, surface, size))
+
+
+def _black(stage: Stage) -> Any:
+    return stage.shared("black", lambda: stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))

@@ -1,0 +1,116 @@
+"""jimenez08: texture-space diffusion of what the camera sees (Jimenez & Gutierrez 2008, Faster rendering of human skin).
+
+Three ways to do less, each with a switch: texels that face away are not lit, maps shrink with distance, and what is
+beside the image is left out. Texels that are left out have an alpha of 0; tiles of a map where all are, are not drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss import frame as shared
+from wgsss.frame import Frame
+from wgsss.graph import Handle
+from wgsss.methods.texture_space import TextureSpace
+from wgsss.scene import Mesh
+from wgsss.stage import Body, Stage
+
+Array = npt.NDArray[np.float64]
+
+LEAST_COSINE = math.cos(math.radians(105.0))
+"""Beyond the 90 degrees of what can be seen, since light comes from what cannot (section 3)."""
+TEXELS_PER_PIXEL = 1.5
+"""At least, beyond the reference distance d_ref (eq. 3). With fewer, pixels are further from the mean over their area
+than those of the full map, which has so many texels to a pixel that it flickers; the paper has about one."""
+SMALLEST = 64
+"""Texels. Smaller maps lose whole charts."""
+REACH = 3.0
+"""Standard deviations of the widest Gaussian, over which light comes from beside the image."""
+_EDGE_TEXELS = 4.0  # what filters read around a texel
+
+
+@dataclass(frozen=True)
+class SeenTextureSpace(TextureSpace):
+    """M_front over the part of the atlas that is seen, at the size at which it is seen; M_back is not estimated."""
+
+    culled: bool = field(default=True, metadata={"unit": "", "help": "leave out what faces away"})
+    depth_based: bool = field(default=True, metadata={"unit": "", "help": "make maps smaller with distance"})
+    clipped: bool = field(default=True, metadata={"unit": "", "help": "leave out what is beside the image"})
+
+    source: ClassVar[str] = "Jimenez & Gutierrez 2008, Faster rendering of human skin"
+
+    def bake(self, stage: Stage) -> None:
+        """As TextureSpace, for all sizes that maps may have, so that no frame has to wait for one."""
+        for size in self.steps() if self.depth_based else [self.map_size]:
+            TextureSpace.bake(replace(self, map_size=size), stage)
+
+    def steps(self) -> list[int]:
+        """The sizes that maps may have, two to an octave, largest first: 1, 3/4, 1/2, 3/8 and so on. All of them together
+        take twice the memory of the largest, however the camera moves."""
+        octaves = range(int(math.log2(self.map_size)))
+        sizes = [size for k in octaves for size in (self.map_size >> k, 3 * self.map_size >> (k + 2))]
+        return [size for size in sizes if size == self.map_size or size >= SMALLEST]
+
+    def maps(self, frame: Frame, body: Body) -> list[Handle]:
+        planes = self.planes(frame, body) if self.clipped else np.zeros((6, 4))
+        if (corners(frame, body) @ planes.T < 0.0).all(axis=0).any():
+            return []
+        culled = self.culled and is_closed(body)
+        size = self.size_seen(frame, body) if self.depth_based else self.map_size
+        smaller = replace(self, map_size=size)
+        if not culled and not self.clipped:
+            return smaller.blurs(frame, body)
+        irradiance = shared.irradiance_texels(
+            frame, body, size, least_cosine=LEAST_COSINE if culled else -2.0, planes=planes
+        )
+        return smaller.blur(frame, body, irradiance, sparse=True)
+
+    def size_seen(self, frame: Frame, body: Body) -> int:
+        """The size of a body's map: s T_max (eq. 3, 4), or the next larger one of `steps`."""
+        pixels_per_mm = pixels_at(frame, corners(frame, body))
+        s = min(TEXELS_PER_PIXEL * pixels_per_mm / self.texels_per_mm(body), 1.0)
+        return min(size for size in self.steps() if size >= s * self.map_size or size == self.map_size)
+
+    def planes(self, frame: Frame, body: Body) -> Array:
+        """(6, 4): the planes of what the camera sees (eq. 5, 6), in world space and mm, facing inwards and moved outwards
+        by as far as light spreads."""
+        x, y, z, w = frame.view.world_to_clip
+        planes = np.stack([w + x, w - x, w + y, w - y, z, w - z])
+        planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+        spread = REACH * math.sqrt(self.profile(body).variances[-1])
+        planes[:, 3] += spread + _EDGE_TEXELS / self.texels_per_mm(body)
+        return planes
+
+
+def corners(frame: Frame, body: Body) -> Array:
+    """(8, 4): the corners of a body's bounding box as posed, in world space, mm, homogeneous."""
+    posed = frame.stage.scene.objects[body.index]
+    box = np.array(np.meshgrid(*posed.mesh.bounds.astype(np.float64).T, indexing="ij")).reshape(3, -1).T
+    return np.column_stack([box, np.ones(8)]) @ posed.matrix.T
+
+
+def pixels_at(frame: Frame, points: Array) -> float:
+    """Pixels that 1 mm across the view takes in the image, at the nearest of homogeneous points (N, 4)."""
+    _, y, _, w = frame.view.world_to_clip
+    distance = float((points @ w).min())  # in perspective along the view, else 1
+    return float(np.linalg.norm(y[:3])) * frame.size[1] / 2 / distance if distance > 0.0 else math.inf
+
+
+def is_closed(body: Body) -> bool:
+    """Whether a body's faces enclose what is inside them, so that no back of a face is seen from outside."""
+    mesh = body.rest.mesh
+    return bool(body.stage.shared(("closed", id(mesh)), lambda: _is_closed(mesh)))
+
+
+def _is_closed(mesh: Mesh) -> bool:
+    ends = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    code = ends @ [len(mesh.positions), 1]
+    back = ends @ [1, len(mesh.positions)]
+    apart = mesh.positions[mesh.faces[:, 0]].astype(np.float64) - mesh.bounds.mean(axis=0)
+    volume = np.einsum("ij,ij->", apart, mesh.face_normals)
+    return len(np.unique(code)) == len(code) and np.array_equal(np.sort(code), np.sort(back)) and bool(volume > 0.0)
