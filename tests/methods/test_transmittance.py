@@ -93,7 +93,23 @@ def test_a_plate_lit_aslant(gpu, angle):
     assert np.ptp(found) < 1e-3 * found.mean(), "no grain"
 
 
-@pytest.mark.parametrize("angle", [5, 30, 60])
+def test_a_wedge_lit_straight_from_behind(gpu):
+    """Nothing is moved aside, not by a tenth of a texel, and at the edge of the wedge half of the rays miss it."""
+    flat = plate(3.0, side=14.0)
+    x, y, z = flat.positions.T
+    wedge = Mesh(np.stack([x, np.where(y < 0, y + 0.3 * x, y), z], axis=1), flat.faces)
+    for middle in (0.0, 7.0):
+        camera = replace(ABOVE, eye=(middle, 50, 0), target=(middle, 0, 0), height=0.32)
+        scene = lit(DirectionalLight((0, 1, 0), (1, 1, 1)), mesh=wedge, material=WIDE, camera=camera)
+        x = middle + floor_points(height=0.32)[16, :, 0]
+        on = x < 7
+        found = thickness_by(through(gpu, scene)[16, on], 1.3)
+        inner = x[on] < 7 - 2 * 15 / 2048
+        np.testing.assert_allclose(found[inner], np.outer(3.0 - 0.3 * x[on][inner], np.ones(3)), atol=3e-4)
+        assert found.min() > 0.4
+
+
+@pytest.mark.parametrize("angle", [5, 16, 30, 60])
 def test_the_lit_side_gets_light_up_to_the_wrap(gpu, angle):
     """Of what reaches x_o itself; from 17.5 degrees above the surface on, nothing."""
     a = np.radians(angle)
@@ -147,6 +163,14 @@ def test_a_ball_lit_from_aside(gpu):
     np.testing.assert_allclose(M[dark], np.exp(-(chord**2) / 40) * (0.3 + cosine[dark]), atol=0.012)
     on = (cosine > -0.25) & (cosine < 0.9)  # at -0.3, E ends in a bend
     assert np.abs(np.diff(M[on], n=2)).max() < 0.005
+
+
+def test_a_ball_of_skin_has_no_grain(gpu):
+    """Where the light grazes it, a shadow texel's depth is more than the narrowest Gaussian."""
+    scene = lit(DirectionalLight((-1, 0, 0), (1, 1, 1)), mesh=sphere(8.0, 40_000), material=SKIN, camera=ABOVE)
+    M = through(gpu, scene, size=200)[60:140, 30:118]
+    assert np.abs(np.diff(M, n=2, axis=1)).max() < 0.01 and np.abs(np.diff(M, axis=0)).max() < 0.01
+    assert M.max() > 0.1
 
 
 def test_the_surface_lets_in_what_it_does_from_outside(gpu):
