@@ -122,6 +122,8 @@ def test_places_of_nodes_and_areas_of_fans(gpu, monkeypatch):
         np.testing.assert_allclose(node["normal"], normal, atol=1e-5)
         assert node["area"] == pytest.approx(area[under].sum(), rel=1e-5)
         assert node["variance"] == pytest.approx(variance, rel=1e-4, abs=1e-5)
+        mean = np.average(found.irradiance[under], axis=0, weights=area[under])
+        np.testing.assert_allclose(found.irradiance[V + k], mean, rtol=1e-4, atol=1e-6)
 
 
 def test_places_at_rest_are_those_of_a_mesh_that_does_not_move(gpu, monkeypatch):
@@ -269,6 +271,16 @@ def test_maps_of_nodes_sum_all_that_is_behind(gpu, monkeypatch, apply):
         expected = np.einsum("oic,ic->oc", K, found.irradiance[: len(found.M)])
         assert rms(found.M - expected) < most * rms(expected)
         assert np.abs(found.M.mean(axis=0) / expected.mean(axis=0) - 1.0).max() < 0.035
+
+
+def test_the_sum_is_blended_with_that_of_the_frame_before(gpu, monkeypatch):
+    given(monkeypatch, random_entries)
+    scene = moving(sphere(6.0, 400), twisted)
+    stage = Stage(gpu, scene)
+    before, now = (Followed(stage, time_s).M for time_s in (0.3, 0.33))
+    alone = Followed(Stage(gpu, scene), 0.33).M
+    np.testing.assert_allclose(now, 0.5 * before + 0.5 * alone, rtol=5e-3)  # 30 ms are half of what is left of it
+    assert rms(before - alone) > 0.02 * rms(alone)
 
 
 def test_fans_that_nearly_touch_are_integrated_at_rest(gpu, monkeypatch):

@@ -48,7 +48,7 @@ fn form_factor(place: Place, receiver: Place) -> vec3f {
     let spread = sqrt(spreads(place)) + ROUNDING;
     let behind = clamp(0.5 - 0.5 * above(place, receiver) / spread, vec2f(0.0), vec2f(1.0));
     let end = arrayLength(&table) - 1u;
-    let at = log_entry(squared_distance(place, receiver) + place.variance, params.low, params.steps, end);
+    let at = log_entry(squared_distance(place, receiver), params.low, params.steps, end);
     let i = u32(at);
     return place.area * behind.x * behind.y * exp2(mix(table[i].rgb, table[i + 1u].rgb, at - f32(i)));
 }
