@@ -239,8 +239,9 @@ class Graph:
         """
         import wgpu
 
+        shown = wgpu.TextureUsage.COPY_SRC | wgpu.TextureUsage.TEXTURE_BINDING
         for handle in wanted:
-            handle.resource.usage |= wgpu.TextureUsage.COPY_SRC if handle.format else wgpu.BufferUsage.COPY_SRC
+            handle.resource.usage |= shown if handle.format else wgpu.BufferUsage.COPY_SRC
         self.ran = self.needed(*wanted)
         chosen = set(self.ran)
         self.culled = [p for p in self.passes if p not in chosen]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -353,10 +353,12 @@ def load(name: str, root: Path = ROOT) -> Module:
 
     Raises WgslError for a missing file, an unknown imported name or a circle of imports, with file and line.
     """
-    return _load(name, root)
+    if (name, root) not in loaded:
+        lines = _resolve(name, root, {}, (), name)
+        text = "\n".join(line for line, _, _ in lines)
+        loaded[name, root] = Module(name, text, tuple((path, n) for _, path, n in lines))
+    return loaded[name, root]
 
 
-@lru_cache(maxsize=None)
-def _load(name: str, root: Path) -> Module:
-    lines = _resolve(name, root, {}, (), name)
-    return Module(name, "\n".join(line for line, _, _ in lines), tuple((path, n) for _, path, n in lines))
+loaded: dict[tuple[str, Path], Module] = {}
+"""modules by name and root, as they were read; what is taken out is read again"""

@@ -9,4 +9,4 @@ from wgsss.reference.volume import Volume
 REFERENCES: dict[str, type[Reference]] = {"volume": Volume, "integral": Integral}
 """those that can be asked for by name where a method can"""
 
-__all__ = ["REFERENCES", "Estimate", "Reference"]
+__all__ = ["REFERENCES", "Estimate", "Integral", "Reference"]

@@ -43,9 +43,13 @@ class Reference(Method, Protocol):
         return None
 
     def passes(self, frame: Frame) -> Diffused:
-        estimate = self.estimate(frame.stage, frame.size)
-        back = None if estimate.M_back is None else _shown(frame, estimate.M_back)
-        return Diffused(_shown(frame, estimate.M_front), back)
+        return shown(frame, self.estimate(frame.stage, frame.size))
+
+
+def shown(frame: Frame, estimate: Estimate) -> Diffused:
+    """Declare the passes that show an estimate of the frame's size."""
+    back = None if estimate.M_back is None else _shown(frame, estimate.M_back)
+    return Diffused(_shown(frame, estimate.M_front), back)
 
 
 def _shown(frame: Frame, M: Array) -> Any:

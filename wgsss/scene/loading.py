@@ -37,11 +37,7 @@ def load_scene(
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """
     chosen = None if material is None else choose_material(material, Path(), "material")
-    scene = _scene(name_or_path, chosen, size_mm, vertices)
-    if isinstance(camera, dict):
-        camera = camera_of(camera, "camera")
-    found = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
-    return replace(scene, camera=camera or scene.camera, lights=tuple(found) or scene.lights)
+    return with_view(_scene(name_or_path, chosen, size_mm, vertices), camera, lights)
 
 
 def _scene(name_or_path: str | Path, chosen: Chosen | None, size_mm: float | None, vertices: int | None) -> Scene:
@@ -69,6 +65,14 @@ def _scene(name_or_path: str | Path, chosen: Chosen | None, size_mm: float | Non
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:
     """The scene with all objects of another material, as of `load_scene`; their textures stay."""
     return _dressed(scene, choose_material(material, Path(), "material"))
+
+
+def with_view(scene: Scene, camera: Table | Camera | None, lights: Sequence[Table | Light]) -> Scene:
+    """The scene with another camera and other lights, as of `load_scene`, where there are any."""
+    if isinstance(camera, dict):
+        camera = camera_of(camera, "camera")
+    found = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
+    return replace(scene, camera=camera or scene.camera, lights=tuple(found) or scene.lights)
 
 
 def _dressed(scene: Scene, chosen: Chosen) -> Scene:
