@@ -3,6 +3,10 @@
 The irradiance at the pixels is blurred along two directions that are at right angles on the surface, by a kernel per
 material whose reach in pixels follows the surface's distance and slope. Unlike the shipped demonstration of 2012 the
 kernel is not scaled by taste: it has the profile's total and, along the directions of the blurs, its response to edges.
+
+A tap reads one pixel for all that it stands for. Where a kernel spans hundreds of pixels, as milk's does on a large
+picture, edges of light and of what is in front come out as faint copies, a tap apart: 33 taps leave a few of them, 65
+next to none.
 """
 
 from __future__ import annotations
