@@ -79,9 +79,7 @@ def test_fitted_entries_read_means_that_fade_into_their_neighbours(gpu):
     entries, light, area = method.map(stage.bodies[0]), light_at_vertices(stage)[:, :3], fan_areas(mesh)
     assert (entries.sender >= entries.senders).mean() > 0.3
     means = entries.tree.sums(light * area[:, None]) / entries.tree.sums(area)[:, None]
-    read = np.full((entries.senders + len(means), 3), np.nan)
-    read[: entries.senders] = light
-    read[entries.senders + entries.blend.node[:, 0]] = entries.blend.of(means)
+    read = np.concatenate([light, entries.blend.of(means)])
     wanted = np.einsum("vnc,vnc->vc", entries.weight, read[np.maximum(entries.sender, 0)])
     assert M.max() > 0.1
     np.testing.assert_allclose(M, wanted, rtol=1e-4, atol=1e-5)

@@ -3,13 +3,13 @@
 const NEIGHBOURS: u32 = 9u;
 
 struct Blend {
-    node: array<u32, NEIGHBOURS>, // the first is the one whose place it takes
+    node: array<u32, NEIGHBOURS>,
     weight: array<f32, NEIGHBOURS>,
 }
 
 struct Params {
     means: u32,   // where the nodes' means begin in `irradiance`
-    blended: u32, // where those of blends do
+    blended: u32, // where blends do
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -25,5 +25,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var k = 0u; k < NEIGHBOURS; k++) {
         sum += blends[id.x].weight[k] * irradiance[params.means + blends[id.x].node[k]];
     }
-    irradiance[params.blended + blends[id.x].node[0]] = sum;
+    irradiance[params.blended + id.x] = sum;
 }

@@ -6,14 +6,14 @@ import package::units::{Number};
 struct Params {
     kept: Number, // share of what M_back was that stays, 1 - alpha
     samples: u32, // entries of a vertex
-    senders: u32, // where nodes begin
-    means: u32,   // of nodes, unblended: they stand before those that entries read
+    senders: u32, // where means begin
+    means: u32,   // of nodes: how many stand before the blends that entries read, where there are blends
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> vertices: array<u32>; // those that have entries
 @group(0) @binding(2) var<storage, read> entries: array<Entry>;
-@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then the means over nodes
+@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>; // L_d at the senders, then means, and their blends
 @group(0) @binding(4) var<storage, read_write> last: array<vec4f>; // M_back as it was, from frame to frame
 @group(0) @binding(5) var<storage, read_write> M_back: array<vec4f>;
 

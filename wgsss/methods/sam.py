@@ -102,18 +102,19 @@ class Adjacency:
                 return sum_behind(frame, body, plan, points, last.M_back, kept)
             entries = follow(graph, body, plan, points, anew=passed == 0.0)
         senders, nodes = len(plan.points.face), plan.nodes
-        blended = 0 if plan.blends is None else nodes
+        blend = plan.entries.blend
+        blended = 0 if blend is None else len(blend.node)
         irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended)
         irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=plan.area)
-        if plan.blends is not None and plan.entries.blend is not None:
+        if blended:
             irradiance = graph.dispatch(
                 "sam/blends",
-                size=len(plan.entries.blend.node),
+                size=blended,
                 params={"means": senders, "blended": senders + nodes},
                 blends=plan.blends,
                 irradiance=irradiance,
             )
-        params = {"kept": kept, "samples": samples, "senders": senders, "means": blended}
+        params = {"kept": kept, "samples": samples, "senders": senders, "means": nodes if blended else 0}
         M_back: Any = None
         for block, of_block in zip(plan.blocks, entries, strict=True):
             M_back = graph.dispatch(

@@ -76,10 +76,10 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
     points = Samples(samples.face[needed], samples.barycentric[needed], samples.share[needed])
     if moving and entries.samples is not None:
         points = _joined(points, at_vertices(mesh))
-    nodes = 0 if tree is None else len(tree.first)
+    means = 0 if tree is None else len(tree.first) if entries.blend is None else len(entries.blend.node)
     places = np.full(entries.senders, -1, np.int32)
     places[needed] = np.arange(len(needed))
-    named = np.concatenate([places, len(points.face) + np.arange(nodes), [-1]])  # of no sender, -1, is the last
+    named = np.concatenate([places, len(points.face) + np.arange(means), [-1]])  # of no sender, -1, is the last
     blocks = _blocks(gpu, vertices, named[entries.sender[vertices]], entries.weight[vertices])
     corners = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
     if tree is None:

@@ -31,8 +31,7 @@ def received(entries, light: np.ndarray, area: np.ndarray) -> np.ndarray:
     at = light
     if entries.tree is not None:
         means = entries.tree.sums(light * area) / entries.tree.sums(area)
-        at = np.concatenate([light, means])
-        at[len(light) + entries.blend.node[:, 0]] = entries.blend.of(means)
+        at = np.concatenate([light, entries.blend.of(means)])
     return np.einsum("vn,vnc->vc", np.where(entries.sender < 0, 0.0, at[entries.sender]), entries.weight)
 
 

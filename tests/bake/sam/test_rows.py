@@ -7,7 +7,8 @@ import pytest
 
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import form_factors
-from wgsss.bake.sam.rows import QuickFormFactors, near_pairs, reaching, senders
+from wgsss.bake.sam.quick import QuickFormFactors
+from wgsss.bake.sam.rows import near_pairs, reaching, senders
 from wgsss.scene import MATERIALS
 from wgsss.scene.shapes import ear, gyroid, slab
 
@@ -33,9 +34,9 @@ def test_they_sum_to_the_form_factors_of_all(gpu, mesh):
     found, wanted = [], []
     for p in some:
         q = patches[p]
-        for o in s.tree.order[s.tree.first[q] :][: s.tree.count[q]]:
-            reached = node[patch == p]
-            found.append(means[reached] @ K(s, np.full(len(reached), o), reached))
+        vertices, reached = s.tree.order[s.tree.first[q] :][: s.tree.count[q]], node[patch == p]
+        found += list((K(s, vertices[None], reached[None])[0] @ means[reached]).T)
+        for o in vertices:
             i = behind(mesh, o)
             wanted.append(light[i] @ form_factors(gpu, mesh, PROFILE, np.stack([np.full(len(i), o), i], axis=1)))
     found, wanted = np.array(found), np.array(wanted)

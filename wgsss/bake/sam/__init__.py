@@ -17,8 +17,10 @@ from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.fit import select_fit
 from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.sam.nonnegative import nonnegative
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.pursuit import pursue
+from wgsss.bake.sam.quick import QuickFormFactors
 from wgsss.bake.sam.rows import senders
 from wgsss.bake.sam.soundness import concerns
 from wgsss.bake.sam.top import best, select_top
@@ -45,7 +47,10 @@ _TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, Bounds, tree, best, "sam/
 _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,
-    "fit": (Entries, fan_areas, Fans, FormFactors, "sam/form_factors", blend, pursue, senders, training, tree),
+    "fit": (
+        *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends"),
+        *(QuickFormFactors, blend, nonnegative, pursue, senders, training, tree),
+    ),
 }
 """What each selection depends on, beside the module that it is in."""
 

@@ -24,11 +24,11 @@ class Entries:
     """M_back at each of V vertices as a sum of n products (000 eq. 12): `weight` times what `sender` receives, L_d.
 
     A sender is a vertex, or one of `samples`; or, where there is a `tree`, a node: the mean over the vertices below it,
-    weighted by the areas of their fans, and over the nodes beside it by `blend`.
+    weighted by the areas of their fans; where there is a `blend`, one of its means over such means.
     """
 
     sender: Array
-    """int32 (V, n): below `senders` a vertex or a sample, else the node `sender - senders`; -1 where there is none"""
+    """int32 (V, n): below `senders` a vertex or a sample, else node or blend `sender - senders`; -1 where none is"""
     weight: Array
     """float32 (V, n, 3), without unit; 0 where there is no sender"""
     senders: int

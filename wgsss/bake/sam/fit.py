@@ -1,7 +1,7 @@
 """`fit`: of all that reaches a vertex from behind, the few means by which its M_back is told best, whatever shines.
 
-What an entry may read is the irradiance at a vertex, or the mean over a node of a tree. Each vertex's exact response to
-a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it.
+What an entry may read is the irradiance at a vertex, or a blended mean over nodes of a tree. Each vertex's exact
+response to a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it.
 """
 
 from __future__ import annotations
@@ -10,19 +10,21 @@ import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
-from wgsss.bake.sam.blend import Blend, blend
+from wgsss.bake.sam.blend import WIDTHS, Blend, blend
 from wgsss.bake.sam.entries import Entries
 from wgsss.bake.sam.pursuit import pursue
-from wgsss.bake.sam.rows import Array, QuickFormFactors, Senders, reaching, senders
-from wgsss.bake.sam.training import training
+from wgsss.bake.sam.quick import QuickFormFactors
+from wgsss.bake.sam.rows import Array, Senders, reaching, senders
+from wgsss.bake.sam.training import compressed, training
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 
-DRAWS = 48
+DRAWS = 32
 """equal shares of a vertex's form factors: what holds the middle of one is a candidate, as are all nodes above it"""
 PATCH = 1
 """level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
@@ -30,7 +32,7 @@ FAINTEST = 1e-3
 """share of what a plane would give back, below which nothing shines through to a vertex"""
 AT_ONCE = 256
 """patches of a thread's task"""
-_BLOCK = 16_000_000  # numbers that a batch of patches holds at a time, about
+_BLOCK = 4_000_000  # numbers that a batch of patches holds at a time, about
 
 
 def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
@@ -41,19 +43,17 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     V = len(mesh.positions)
     K = QuickFormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
-    nodes = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
-    light, own = _lights(s, nodes, training(mesh))
+    means = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
+    own, read = _lights(s, means, compressed(training(mesh), s.area[:V]))
     sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
 
     def fit(patches: Array) -> int:
-        for vertices, reached in _batches(s, K, patches, light.shape[1]):
-            k = K(s, vertices[:, :, None], reached[:, None]) * (reached >= 0)[:, None, :, None]
-            candidates = _candidates(s, k, reached)
-            B, P, C, _ = k.shape
-            response = k.transpose(0, 1, 3, 2).reshape(B, 3 * P, C) @ own[reached]
-            seen = light[candidates]
-            moment = (seen @ response.transpose(0, 2, 1)).reshape(B, -1, P, 3).transpose(0, 2, 1, 3)
-            chosen, w = pursue(seen @ seen.transpose(0, 2, 1), moment, n)
+        for vertices, reached in _batches(s, K, patches, own.shape[1]):
+            k = K(s, vertices, reached)
+            candidates = _candidates(s, k.sum(axis=1), reached)
+            B, _, P, C = k.shape
+            response = (k.reshape(B, 3 * P, C) @ own[reached]).reshape(B, 3, P, -1)
+            chosen, w = pursue(read[candidates], response, n)
             there = vertices >= 0
             found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
             sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
@@ -73,21 +73,29 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
             bar.update(done)
     weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
     sender[~weight.any(axis=2)] = -1
-    read = np.unique(sender[sender >= V]) - V
-    return Entries(sender, weight, V, tree=s.tree, blend=nodes.only(read))
+    is_mean = sender >= V
+    used, at = np.unique(sender[is_mean] - V, return_inverse=True)
+    sender[is_mean] = V + at
+    return Entries(sender, weight, V, tree=s.tree, blend=means.only(used))
 
 
-def _lights(s: Senders, nodes: Blend, lights: Array) -> tuple[Array, Array]:
-    """Irradiances (T, V) as they are read, (V + N + 1, T), nodes being blended, and as they are; one row for none."""
-    T, V = lights.shape
-    read, own = np.zeros((2, len(s.area) + 1, T), np.float32)
-    read[:V] = own[:V] = lights.T
-    for first in range(0, T, 16):  # since sums are taken in float64
+def _lights(s: Senders, means: Blend, lights: Array) -> tuple[Array, Array]:
+    """Irradiances (V, T) of vertices and all nodes over them, as they are (V + N + 1, T), and as entries read them:
+    of vertices and of all blended means (V + U + 1, T). The last rows are 0, of no sender."""
+    V, T = lights.shape
+    own = np.zeros((len(s.area) + 1, T), np.float32)
+    own[:V] = lights
+    finest = s.tree.first[: s.tree.levels[1]]
+    sums = np.add.reduceat((lights * s.area[:V, None])[s.tree.order], finest)
+    for a, b in pairwise(V + s.tree.levels):
+        own[a:b] = sums / _positive(s.area[a:b, None])
+        sums = sums.reshape(-1, 4, T).sum(axis=1) if b - a > 1 else sums
+    read = np.zeros((V + len(means.node) + 1, T), np.float32)
+    read[:V] = lights
+    for first in range(0, T, 16):  # since what is gathered is nine times as large
         some = slice(first, first + 16)
-        means = s.tree.sums(own[:V, some] * s.area[:V, None]) / _positive(s.area[V:, None])
-        own[V:-1, some] = means
-        read[V:-1, some] = nodes.of(means)
-    return read, own
+        read[V:-1, some] = means.of(own[V:-1, some])
+    return own, read
 
 
 def _batches(s: Senders, K: QuickFormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
@@ -118,9 +126,12 @@ def _ranges(values: Array, first: Array, count: Array) -> Array:
 
 
 def _candidates(s: Senders, k: Array, reached: Array) -> Array:
-    """Senders (B, candidates) by form factors k (B, P, C, 3) of what reaches the patches (B, C); -1 fills up."""
-    share = np.einsum("bpck,bpk->bpc", k, 1.0 / (3.0 * _positive(k.sum(axis=2))))
-    drawn = np.diff(np.floor(np.cumsum(share, axis=2) * DRAWS + 0.5), axis=2, prepend=0.0) > 0.0
+    """Vertices and blended means (B, candidates) by form factors k (B, P, C), of all channels, of what reaches the
+    patches (B, C); -1 fills up."""
+    before = np.cumsum(k, axis=2)
+    before *= DRAWS / _positive(before[..., -1:])
+    share = np.floor(before + 0.5)
+    drawn = np.diff(share, axis=2, prepend=np.float32(0.0)) > 0.0
     patch, column = np.nonzero(drawn.any(axis=1))
     sender, all_ = reached[patch, column], len(s.area)
     keys = [patch * all_ + sender]
@@ -131,7 +142,10 @@ def _candidates(s: Senders, k: Array, reached: Array) -> Array:
         keys.append(key)
     patch, sender = np.divmod(np.unique(np.concatenate(keys)), all_)
     start = np.searchsorted(patch, np.arange(len(k) + 1))
-    return _ranges(sender, start[:-1], np.diff(start))
+    found = _ranges(sender, start[:-1], np.diff(start))
+    nodes, V = all_ - len(s.tree.order), len(s.tree.order)
+    wider = [np.where(found >= V, found + width * nodes, -1) for width in range(1, len(WIDTHS))]
+    return np.concatenate([found, *wider], axis=1)
 
 
 def _positive(values: Array) -> Array:

@@ -6,33 +6,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.tree import Tree, tree
-from wgsss.gpu import Gpu
-from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
+
+if TYPE_CHECKING:
+    from wgsss.bake.sam.quick import QuickFormFactors
 
 Array = npt.NDArray[Any]
 
 OPENING = 0.35
 """radius of a node over its distance, at most; the published criterion of the same kind (004 eq. 42) takes sizes"""
-BEYOND = 1e-3
-"""share of the light of a plane that comes from farther away than what is looked at"""
-FAINT = 3e-3
-"""share of what leaves a plane in all, below which a node is not looked into"""
 NEAR = 4.0
 """roots of a fan's area within which form factors are integrated; a fan is some 1.2 across"""
 ORDER = 2
 """of the points in a quad that they are integrated by"""
-_ENTRIES = 4096  # of the table of R_d
-_NEAREST = 1e-3  # its first distance, of the last
+_AT_ONCE = 1 << 16  # vertices whose neighbours are found at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,59 +100,30 @@ def senders(mesh: Mesh, spread: float) -> Senders:
     return Senders(made, *(np.concatenate(pair).astype(np.float32) for pair in zip(of_vertices, of_nodes, strict=True)))
 
 
-class QuickFormFactors:
-    """K from senders to vertices: between near fans integrated over both, beyond that R_d at their distance."""
-
-    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
-        self.farthest = float(profile.range(BEYOND).max())
-        self.faint = FAINT * float(profile.total.max())
-        self._low = 2.0 * np.log(_NEAREST * self.farthest)
-        self._steps = (_ENTRIES - 1) / (-2.0 * np.log(_NEAREST))
-        r = self.farthest * np.geomspace(_NEAREST, 1.0, _ENTRIES)
-        self._R = profile.reflectance(r).astype(np.float32)
-        self._R[-1] = 0.0  # and beyond
-        pairs = near_pairs(mesh)
-        self._vertices = len(mesh.positions)
-        self._pairs = pairs[:, 0] * self._vertices + pairs[:, 1]
-        self._near = FormFactors(gpu, mesh, profile).of(pairs, most=ORDER)
-
-    def reflectance(self, squared: Array) -> Array:
-        """R_d, 1/mm^2, (..., 3), at the roots of `squared` (...) mm^2."""
-        at = (np.log(np.maximum(squared, 1e-30)) - self._low) * self._steps + 0.5
-        return self._R[np.clip(at, 0, _ENTRIES - 1).astype(np.int32)]
-
-    def __call__(self, s: Senders, o: Array, i: Array) -> Array:
-        """float32 (..., 3): from senders i to vertices o (...), 0 where they are not behind them (000 eq. 13, 14)."""
-        between = s.x[i] - s.x[o]
-        back = np.einsum("...d,...d->...", between, s.n[o]) < 0.0
-        back &= np.einsum("...d,...d->...", s.n[i], s.n[o]) < 0.0
-        apart = s.centre[i] - s.centre[o]
-        R = self.reflectance(np.einsum("...d,...d->...", apart, apart) + s.extent[i])
-        K = R * np.where(back, s.area[i], np.float32(0.0))[..., None]
-        near = np.einsum("...d,...d->...", between, between) < 1.01 * NEAR**2 * np.maximum(s.area[i], s.area[o])
-        near &= back & (i < self._vertices)
-        pair = (o * np.int64(self._vertices) + i)[near]
-        at = np.searchsorted(self._pairs, pair)
-        known = np.append(self._pairs, np.iinfo(np.int64).max)[at] == pair
-        near[near] = known
-        K[near] = self._near[at[known]]
-        return K
-
-
 def near_pairs(mesh: Mesh) -> Array:
     """int64 (P, 2): vertices o and i, on the back side of o, whose distance is NEAR roots of the larger fan's area at
     most; in ascending order."""
     from scipy.spatial import KDTree
 
     x, n, V = mesh.positions.astype(np.float64), mesh.normals, len(mesh.positions)
-    found = KDTree(x).query_ball_point(x, NEAR * np.sqrt(fan_areas(mesh)), workers=-1)
-    o = np.repeat(np.arange(V), [len(near) for near in found])
-    i = np.concatenate([np.asarray(near, np.int64) for near in found])
-    o, i = np.concatenate([o, i]), np.concatenate([i, o])
-    back = np.einsum("pd,pd->p", n[o], n[i]) < 0.0
-    o, i = np.divmod(np.unique(o[back] * V + i[back]), V)
+    reach = NEAR * np.sqrt(fan_areas(mesh))
+    everything = KDTree(x)
+    found = []
+    order = np.argsort(reach, kind="stable")  # of those of one search, which has one radius, few have a smaller one
+    for some in np.split(order, _cuts(reach[order])):
+        pairs = KDTree(x[some]).sparse_distance_matrix(everything, reach[some[-1]], output_type="ndarray")
+        o, i = some[pairs["i"]], pairs["j"]
+        kept = (pairs["v"] <= reach[o]) & (np.einsum("pd,pd->p", n[o], n[i]) < 0.0)
+        found += [o[kept] * V + i[kept], i[kept] * V + o[kept]]
+    o, i = np.divmod(np.unique(np.concatenate(found)), V)
     below = np.einsum("pd,pd->p", x[i] - x[o], n[o]) < 0.0
     return np.stack([o, i], axis=1)[below]
+
+
+def _cuts(reach: Array) -> Array:
+    """Where to cut ascending reaches, so that those of a part are alike by a factor of the root of 2."""
+    octave = np.floor(2.0 * np.log2(np.maximum(reach, 1e-30)))
+    return np.flatnonzero((np.diff(octave) > 0) | (np.arange(1, len(reach)) % _AT_ONCE == 0)) + 1
 
 
 def reaching(s: Senders, K: QuickFormFactors, patches: Array) -> tuple[Array, Array]:
@@ -181,7 +147,7 @@ def reaching(s: Senders, K: QuickFormFactors, patches: Array) -> tuple[Array, Ar
         back = (height - reach - tilted < 0.0) & (turned + spread > 0.5 * np.pi) & (distance - reach < K.farthest)
         clear = (height + reach + tilted < 0.0) & (turned - spread > 0.5 * np.pi)
         near = s.radius[node] > OPENING * np.where(clear, 1.0, 0.5) * (distance - s.radius[o])
-        near &= s.area[node] * K.reflectance(np.square(np.maximum(distance - reach, 0.0))).max(axis=1) > K.faint
+        near &= s.area[node] * K.reflectance(np.square(np.maximum(distance - reach, 0.0))).max(axis=0) > K.faint
         stays = back & (~near | (node < V))
         found.append(np.stack([patch[stays], node[stays]]))
         opened = np.flatnonzero(back & near & (node >= V))
