@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import frame as shared
+from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.rows import ORDER, near_pairs
@@ -30,6 +31,8 @@ Array = npt.NDArray[Any]
 _LEVELS = 16  # of wgsl/sam/sum.wgsl: 4^16 vertices
 _FINE = 0.05  # in place of OPENING, by which totals at rest are exact
 _MOST = 16.0  # of a scale: what hardly anything reaches tells little
+_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
+_CODE = (FormFactors, fan_areas, near_pairs, deforming, "sam/form_factors", "sam/sum")
 
 
 def sum_behind(frame: Frame, body: Body, plan: Plan, points: Any, last: Any, kept: float) -> Handle:
@@ -67,20 +70,27 @@ def _sum(graph: Graph, body: Body, plan: Plan, constants: Any = None, kept: floa
 
 
 def _scale(body: Body, plan: Plan) -> Array:
-    """float32 (V, 4): all form factors of the vertices at rest, over what the sum takes them for."""
+    """float32 (V, 4): all form factors of the vertices at rest, over what the sum takes them for; cached."""
     gpu, mesh, profile, held = body.stage.gpu, body.rest.mesh, body.material.profile, deforming(body, plan)
-    V, (o, i) = len(mesh.positions), near_pairs(mesh).T
-    distance = np.maximum(np.linalg.norm(mesh.positions[o] - mesh.positions[i], axis=1), np.exp2(0.5 * held.low))
-    near = FormFactors(gpu, mesh, profile).of(np.stack([o, i], axis=1), most=ORDER)
-    more = near - fan_areas(mesh)[i, None] * profile.reflectance(distance)
-    more = np.stack([np.bincount(o, more[:, channel], V) for channel in range(3)], axis=1)
+    tree, V = plan.entries.tree, len(mesh.positions)
+    assert tree is not None
 
-    graph = Graph(gpu)
-    even, dark = gpu.buffer(np.ones((V + plan.nodes, 4), np.float32)), gpu.buffer(np.zeros((V, 4), np.float32))
-    given = {"places": held.rest, "irradiance": even, "scale": even, "last": dark}
-    totals = [_sum(graph, body, plan, constants, **given) for constants in (None, {"OPENING": _FINE})]
-    graph.run(*totals)
-    taken, total = (graph.read(handle)[:, :3] for handle in totals)
-    scale = np.ones((V, 4), np.float32)
-    scale[:, :3] = np.clip((total + more) / np.maximum(taken, 1e-30), 0.0, _MOST)
-    return scale
+    def make() -> Arrays:
+        o, i = near_pairs(mesh).T
+        distance = np.maximum(np.linalg.norm(mesh.positions[o] - mesh.positions[i], axis=1), np.exp2(0.5 * held.low))
+        near = FormFactors(gpu, mesh, profile).of(np.stack([o, i], axis=1), most=ORDER)
+        more = near - fan_areas(mesh)[i, None] * profile.reflectance(distance)
+        more = np.stack([np.bincount(o, more[:, channel], V) for channel in range(3)], axis=1)
+
+        graph = Graph(gpu)
+        even, dark = gpu.buffer(np.ones((V + plan.nodes, 4), np.float32)), gpu.buffer(np.zeros((V, 4), np.float32))
+        given = {"places": held.rest, "irradiance": even, "scale": even, "last": dark}
+        totals = [_sum(graph, body, plan, constants, **given) for constants in (None, {"OPENING": _FINE})]
+        graph.run(*totals)
+        taken, total = (graph.read(handle)[:, :3] for handle in totals)
+        scale = np.ones((V, 4), np.float32)
+        scale[:, :3] = np.clip((total + more) / np.maximum(taken, 1e-30), 0.0, _MOST)
+        return {"scale": scale}
+
+    key: list[KeyPart] = [mesh.positions, mesh.faces, tree.order, profile.reflectance(_PROBES), gpu.name]
+    return cached("sam-scale", key, make, code=_CODE, label="summing all form factors at rest")["scale"]
