@@ -14,6 +14,7 @@ struct Params {
 }
 
 override OPENING: Number = 0.15; // of a node's root mean square radius over its distance, at most
+const ACROSS: Number = 0.7;   // of that, where a node is on both sides of a horizon
 const IN_FRONT: Number = 1.5; // spreads by which a mean is above a horizon, as all of it then is
 const ROUNDING: Number = 1e-6;
 
@@ -66,9 +67,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     while level <= params.top {
         let i = params.levels[level].x + k;
         let node = places[i];
-        let over = above(node, receiver);
-        if all(over * abs(over) <= IN_FRONT * IN_FRONT * spreads(node) + ROUNDING * ROUNDING) {
-            if node.variance <= OPENING * OPENING * squared_distance(node, receiver) {
+        let over = above(node, receiver) * abs(above(node, receiver));
+        let spread = spreads(node);
+        if all(over <= IN_FRONT * IN_FRONT * spread + ROUNDING * ROUNDING) {
+            let opening = OPENING * select(ACROSS, 1.0, all(over <= -spread));
+            if node.variance <= opening * opening * squared_distance(node, receiver) {
                 M += form_factor(node, receiver) * irradiance[i].rgb;
             } else if level > 0u {
                 level--;
