@@ -16,14 +16,19 @@ from wgsss.methods.point_cloud import PointCloud
 from wgsss.methods.sam import SURFACES, Adjacency, SpatialAdjacencyMaps
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
+from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps
 from wgsss.methods.transmittance import Transmittance
 
-TRANSLUCENCIES: dict[str, type[Translucency]] = {"transmittance": Transmittance, "sam": Adjacency}
+TRANSLUCENCIES: dict[str, type[Translucency]] = {
+    "tsm": TranslucentShadowMaps,
+    "transmittance": Transmittance,
+    "sam": Adjacency,
+}
 """What estimates M_back. "none" leaves it black."""
 
 METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
-    "deon07": TextureSpace,
+    "deon07": pair(TextureSpace, TranslucentShadowMaps),
     "jimenez15": pair(ScreenSpace, Transmittance),
     "jensen02": PointCloud,
     "sam": SpatialAdjacencyMaps,

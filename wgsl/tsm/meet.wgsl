@@ -1,0 +1,39 @@
+// A translucent shadow map: where a light's rays first meet one object, in space and in its atlas, and the normal there
+// (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009, 3.4).
+
+import package::mesh::{Vertex, Surface};
+import package::targets::{RGBA32Float, RG32Float, RGBA16Float};
+
+struct Params {
+    world_to_clip: mat4x4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) atlas: vec2f,
+}
+
+struct Texel {
+    @location(0) x_i: RGBA32Float, // mm, world; 1 where the object is met
+    @location(1) n_i: RGBA16Float,
+    @location(2) atlas: RG32Float,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vertex.atlas);
+}
+
+@fragment
+fn fs(in: Varying) -> Texel {
+    return Texel(vec4f(in.position, 1.0), vec4f(normalize(in.normal), 0.0), in.atlas);
+}

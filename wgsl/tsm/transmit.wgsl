@@ -1,0 +1,117 @@
+// What one light sends through an object to its pixels: where its rays first meet the object, at x_i, the irradiance
+// blurred by each Gaussian, weakened by the way from there to x_o (Mikkelsen 2009, 3.4 and figure 10).
+
+import package::units::{Length, Number, Position, Direction, Irradiance};
+import package::mesh::{Surface, color_after};
+import package::light::{ShadowView, cube_face};
+import package::rectangle::{rectangle_corner};
+import package::screen::{position_of_pixel};
+import package::targets::{RGBA32Float};
+
+override VIEWS: u32 = 1u; // of the light: one of the whole scene, or a cube of 6
+
+struct Params {
+    clip_to_world: mat4x4f,
+    light: vec4f,               // xyz, 1: where it is; xyz, 0: the direction towards it
+    rectangle: vec4f,           // where the object may be
+    gaussians: array<vec4f, 6>, // rgb: weight; its variance, mm^2
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var normal: texture_2d<f32>;
+@group(0) @binding(4) var base_color: texture_2d<f32>;
+@group(0) @binding(5) var depth: texture_depth_2d;
+@group(0) @binding(6) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(7) var entry: texture_2d_array<f32>;
+@group(0) @binding(8) var entry_normal: texture_2d_array<f32>;
+@group(0) @binding(9) var entry_atlas: texture_2d_array<f32>;
+@group(0) @binding(10) var linear_clamp: sampler;
+@group(0) @binding(11) var blurred_0: texture_2d<f32>;
+@group(0) @binding(12) var blurred_1: texture_2d<f32>;
+@group(0) @binding(13) var blurred_2: texture_2d<f32>;
+@group(0) @binding(14) var blurred_3: texture_2d<f32>;
+@group(0) @binding(15) var blurred_4: texture_2d<f32>;
+@group(0) @binding(16) var blurred_5: texture_2d<f32>;
+@group(0) @binding(17) var so_far: texture_2d<f32>; // M_back by the lights before, or a single black texel
+
+struct Pixel {
+    @location(0) M_back: RGBA32Float,
+}
+
+// What enters within some sigmas of a Gaussian from x_o is in M_front already: farther away, it counts in full.
+const FADED: Number = 4.0;
+const OPPOSED: Number = 1e-3;
+
+struct Way {
+    through: Length, // from x_i to x_o, as the Gaussians take it
+    over: Length,    // about how far it is over the surface
+}
+
+// Through the object: figure 10's correction is the distance of x_o from the plane at x_i. It is made as far as the normals
+// oppose each other, as on a level slab (d'Eon & Luebke 2007, 14.5.7).
+//
+// Over the surface: as far as straight on where the normals are the same, endless where they are opposed. The atlas would
+// tell it within a chart only, and where charts end would be seen.
+//
+// What is looked up lies beside x_o's ray, by up to a texel. The distance along the ray is that to the plane at x_i, and
+// on the same sheet less than that, or what is lit would lie behind itself.
+fn way(x_i: Position, n_i: Direction, x_o: Position, n_o: Direction, w_i: Direction) -> Way {
+    let alike = dot(n_i, n_o);
+    let beside = length(cross(x_i - x_o, w_i));
+    let below = max(dot(x_i - x_o, n_i), 0.0);
+    let distance = min(length(x_i - x_o), below / max(dot(n_i, w_i), 1e-6));
+    let through = mix(distance, below, clamp(-alike, 0.0, 1.0));
+    let over = max(distance - beside * max(alike, 0.0), 0.0) / max(0.5 + 0.5 * alike, OPPOSED);
+    return Way(through, over);
+}
+
+fn share(blurred: texture_2d<f32>, linear_clamp: sampler, uv: vec2f, k: vec4f, way: Way) -> Irradiance {
+    let weakened = exp(-0.5 * way.through * way.through / k.w) * smoothstep(0.0, FADED, way.over * inverseSqrt(k.w));
+    return k.rgb * weakened * textureSampleLevel(blurred, linear_clamp, uv, 0.0).rgb;
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return rectangle_corner(i, params.rectangle);
+}
+
+@fragment
+fn fs(@builtin(position) pixel: vec4f) -> Pixel {
+    let texel = vec2u(pixel.xy);
+    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+        discard;
+    }
+    let x_o = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let n_o = normalize(textureLoad(normal, texel, 0).xyz);
+    let w_i = normalize(params.light.xyz - x_o * params.light.w);
+    let layer = select(0u, cube_face(-w_i), VIEWS == 6u);
+    let clip = views[layer].world_to_clip * vec4f(x_o, 1.0);
+    let size = vec2f(textureDimensions(entry));
+    let place = (vec2f(0.5, -0.5) * clip.xy / clip.w + 0.5) * size - 0.5;
+    let f = fract(place);
+    var M = vec3f(0.0);
+    var counted = 0.0;
+    for (var i = 0u; i < 4u; i++) { // one by one: between atlas coordinates of two charts there is nothing
+        let step = vec2u(i & 1u, i >> 1u);
+        let at = clamp(vec2i(floor(place)) + vec2i(step), vec2i(0), vec2i(size) - 1);
+        let x_i = textureLoad(entry, at, layer, 0);
+        let n_i = textureLoad(entry_normal, at, layer, 0).xyz;
+        let uv = textureLoad(entry_atlas, at, layer, 0).xy;
+        let nearness = select(1.0 - f, f, step == vec2u(1u));
+        let way = way(x_i.xyz, n_i, x_o, n_o, w_i);
+        var sum = share(blurred_0, linear_clamp, uv, params.gaussians[0], way);
+        sum += share(blurred_1, linear_clamp, uv, params.gaussians[1], way);
+        sum += share(blurred_2, linear_clamp, uv, params.gaussians[2], way);
+        sum += share(blurred_3, linear_clamp, uv, params.gaussians[3], way);
+        sum += share(blurred_4, linear_clamp, uv, params.gaussians[4], way);
+        sum += share(blurred_5, linear_clamp, uv, params.gaussians[5], way);
+        let weight = nearness.x * nearness.y * x_i.w;
+        M += weight * sum;
+        counted += weight; // a ray that passes by says nothing of x_o, which is beside it
+    }
+    M *= color_after(surface, textureLoad(base_color, texel, 0).rgb) / max(counted, 1e-6);
+    let others = textureLoad(so_far, min(texel, textureDimensions(so_far) - 1u), 0).rgb;
+    return Pixel(vec4f(others + M, 1.0));
+}
