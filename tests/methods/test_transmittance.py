@@ -27,6 +27,7 @@ SKIN = replace(MATTE, gaussians=SKIN_GAUSSIANS)
 WEIGHTS = np.array([0.9, 0.5, 0.1])
 WIDE = replace(MATTE, gaussians=SumOfGaussians(np.array([20.0]), WEIGHTS[None]))
 UP = DirectionalLight((0, 1, 0), (1, 2, 3))
+RADIUS = np.sqrt(40 * np.log(2))  # mm: half of WIDE's light leaves within
 TEXEL = 60 / 2048  # mm, or a little less: of the shadow maps here
 
 
@@ -53,6 +54,13 @@ def floor_points(size=32, height=20.0):
 def thickness_by(M, E):
     """How thick WIDE is where it lets through M of E."""
     return np.sqrt(-40.0 * np.log(M / (WEIGHTS * E)))
+
+
+def depth_in_a_plate(thickness, cosine, distance=np.inf):
+    """Along a ray to a light at `distance`, which passes x_o as far below as WIDE asks for."""
+    shrink = RADIUS * (1 - cosine**2)
+    lowered = cosine - shrink / distance
+    return (thickness - shrink) / (lowered / np.hypot(lowered, np.sqrt(1 - cosine**2))) + shrink * cosine
 
 
 def test_table_is_the_sum_over_gaussians():
@@ -87,9 +95,9 @@ def test_a_plate_lit_straight_from_behind(gpu, thickness):
 def test_a_plate_lit_aslant(gpu, angle):
     a = np.radians(angle)
     light = DirectionalLight((np.sin(a), np.cos(a), 0), (1, 1, 1))
-    M = through(gpu, lit(light, mesh=plate(3.0), material=WIDE, camera=ABOVE))
+    M = through(gpu, lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE))
     found = thickness_by(M, 0.3 + np.cos(a))
-    np.testing.assert_allclose(found, 3.0 / np.cos(a), atol=3 * TEXEL / np.cos(a))
+    np.testing.assert_allclose(found, depth_in_a_plate(6.0, np.cos(a)), atol=3 * TEXEL / np.cos(a))
     assert np.ptp(found) < 1e-3 * found.mean(), "no grain"
 
 
@@ -109,17 +117,15 @@ def test_a_wedge_lit_straight_from_behind(gpu):
         assert found.min() > 0.6
 
 
-@pytest.mark.parametrize("angle", [5, 16, 30, 60])
-def test_the_lit_side_gets_light_up_to_the_wrap(gpu, angle):
-    """Of what reaches x_o itself; from 17.5 degrees above the surface on, nothing."""
+@pytest.mark.parametrize("angle", [6, 10, 16, 30, 60])
+def test_the_lit_side_gets_next_to_nothing(gpu, angle):
+    """Though E ends only 17.5 degrees above the surface."""
     a = np.radians(angle)
     light = DirectionalLight((-np.cos(a), -np.sin(a), 0), (1, 1, 1))
-    M = through(gpu, lit(light, mesh=plate(3.0), material=WIDE, camera=ABOVE))
-    expected = np.broadcast_to(WEIGHTS * max(0.3 - np.sin(a), 0), M.shape)
-    np.testing.assert_allclose(M, expected, rtol=0.05)
+    assert through(gpu, lit(light, mesh=plate(3.0), material=SKIN, camera=ABOVE)).max() < 5e-3
 
 
-@pytest.mark.parametrize("depth", [60.0, 9.0, 400.0])
+@pytest.mark.parametrize("depth", [60.0, 12.0, 400.0])
 def test_point_lights(gpu, depth):
     """Seen by one view of the scene, from amid it by a cube, whose faces meet where its light is at 45 degrees, and
     from so far away that rays are parallel."""
@@ -127,42 +133,42 @@ def test_point_lights(gpu, depth):
     if depth == 400.0:
         light = PointLight((0, -1e5, 0), intensity=(1e4, 1e4, 1e4))
     below = Object(plane(side=40.0, y=-30.0), MATTE)
-    scene = lit(light, mesh=plate(3.0), material=WIDE, camera=ABOVE, extra=(below,) if depth == 9.0 else ())
+    scene = lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE, extra=(below,) if depth == 12.0 else ())
     way = floor_points() - light.position
     distance = np.linalg.norm(way, axis=-1, keepdims=True)
     cosine = way[..., 1:2] / distance
     E = light.intensity * (0.3 + cosine) / (distance / 1000) ** 2
     found = thickness_by(through(gpu, scene), E)
-    np.testing.assert_allclose(found, np.broadcast_to(3.0 / cosine, found.shape), atol=4 * TEXEL)
+    np.testing.assert_allclose(
+        found, np.broadcast_to(depth_in_a_plate(6.0, cosine, distance), found.shape), atol=4 * TEXEL
+    )
 
 
 def test_area_lights(gpu):
     light = RectLight((0, -40, 0), (0, 1, 0), (0, 0, 1), 30, 20, radiance=(50, 40, 30), samples=24)
-    M = through(gpu, lit(light, mesh=plate(3.0), material=WIDE, camera=ABOVE))
+    M = through(gpu, lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE))
     x, z = np.meshgrid(*((np.arange(60) + 0.5) / 60 * side - side / 2 for side in (30, 20)))
     for row, column in ((16, 16), (3, 28)):
         x_o = floor_points()[row, column]
         way = x_o - np.stack([x, np.full_like(x, -40), z], axis=-1)
         distance = np.linalg.norm(way, axis=-1)
         cosine = way[..., 1] / distance
-        T = np.exp(-((3.0 / cosine) ** 2) / 40)
+        T = np.exp(-(depth_in_a_plate(6.0, cosine, distance) ** 2) / 40)
         E = cosine / distance**2 * (0.3 + cosine) * T * (30 * 20 / x.size)
         np.testing.assert_allclose(M[row, column], WEIGHTS * [50, 40, 30] * E.sum(), rtol=0.02)
 
 
 def test_a_ball_lit_from_aside(gpu):
-    """Chords of a ball; up to where the light grazes it there is neither grain nor a step."""
-    ball = sphere(8.0, 40_000)
+    """Chords of a ball, below its surface; up to where the light grazes it there is neither grain nor a step."""
     light = DirectionalLight((-1, 0, 0), (1, 1, 1))
-    camera = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=20)
-    M = through(gpu, lit(light, mesh=ball, material=WIDE, camera=camera), size=200)[100, :, 0] / WEIGHTS[0]
+    M = through(gpu, lit(light, mesh=sphere(8.0, 40_000), material=WIDE, camera=ABOVE), size=200)[100, :, 0]
     x = ((np.arange(200) + 0.5) / 200 - 0.5) * 20
-    cosine = -x / 8.0  # 0 where the light grazes the ball: it comes from +x
-    dark = (cosine > 0.1) & (cosine < 0.98)
-    chord = 16.0 * cosine[dark]
-    np.testing.assert_allclose(M[dark], np.exp(-(chord**2) / 40) * (0.3 + cosine[dark]), atol=0.012)
-    on = (cosine > -0.25) & (cosine < 0.9)  # at -0.3, E ends in a bend
-    assert np.abs(np.diff(M[on], n=2)).max() < 0.005
+    on = (x > -7.2) & (x < 2.2)
+    cosine = -x[on] / 8.0  # 0 where the light grazes the ball: it comes from +x
+    sine = np.sqrt(1 - cosine**2)
+    depth = 8.0 * cosine + np.sqrt(64 - (8.0 - RADIUS * sine**2) ** 2 * sine**2)
+    np.testing.assert_allclose(M[on] / WEIGHTS[0], np.exp(-(depth**2) / 40) * (0.3 + cosine), atol=0.004)
+    assert np.abs(np.diff(M[on], n=2)).max() < 0.002
 
 
 def test_a_ball_of_skin_has_no_grain(gpu):
@@ -170,7 +176,7 @@ def test_a_ball_of_skin_has_no_grain(gpu):
     scene = lit(DirectionalLight((-1, 0, 0), (1, 1, 1)), mesh=sphere(8.0, 40_000), material=SKIN, camera=ABOVE)
     M = through(gpu, scene, size=200)[60:140, 30:118]
     assert np.abs(np.diff(M, n=2, axis=1)).max() < 0.01 and np.abs(np.diff(M, axis=0)).max() < 0.01
-    assert M.max() > 0.1
+    assert M.max() > 0.01
 
 
 def test_the_surface_lets_in_what_it_does_from_outside(gpu):

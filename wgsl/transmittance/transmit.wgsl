@@ -12,6 +12,7 @@ import package::targets::{RGBA32Float};
 struct Params {
     clip_to_world: mat4x4f,
     rectangle: vec4f, // where the object may be
+    shrink: Length,   // how far x_o is moved below the surface where light grazes it
     reach: Length,    // the thickness that the table ends at: no light goes through more
 }
 
@@ -34,8 +35,8 @@ struct Pixel {
 // not parallel to the front, some light arrives there (Jimenez et al. 2010).
 const WRAP: Number = 0.3;
 
-// How far x_o is moved below the surface, in shadow texels per unit of sine. A lookup reaches 1.5 texels to each side:
-// closer to the surface, some would find x_o outside.
+// And further below, in shadow texels per unit of sine. A lookup reaches 1.5 texels to each side: closer to the surface,
+// some would find x_o outside.
 const SHRINK_TEXELS: Number = 2.0;
 
 fn transmittance(d: Length) -> vec3f {
@@ -52,14 +53,16 @@ fn spline(f: f32) -> vec3f {
     return vec3f(0.5 * a * a, 0.75 - f * f, 0.5 * b * b);
 }
 
-// From where a light's rays first meet the scene to x_o, along them: mean over those nearby, by weights that keep planes
-// as they are. 0 where they meet nothing before x_o.
+// How deep x_o is below where the light's rays first meet the scene, along them: of the rays that pass below it, mean over
+// those nearby by weights that keep planes as they are. 0 where they meet nothing.
 fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length {
     let first = views[light.first_view];
     let perspective = first.perspective != 0u;
     let texel = first.texel * select(1.0, at.distance, perspective);
     let cosine = dot(n, at.direction);
-    let x = x_o - n * (SHRINK_TEXELS * texel * sqrt(max(1.0 - cosine * cosine, 0.0)));
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    let shrink = SHRINK_TEXELS * texel * sine + params.shrink * sine * sine;
+    let x = x_o - n * shrink;
     let layer = light.first_view + select(0u, cube_face(x - light.position), light.views == 6u);
     let to_clip = views[layer].world_to_clip;
     let clip = to_clip * vec4f(x, 1.0);
@@ -83,7 +86,7 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
             let met = textureLoad(shadow_maps, there, layer, 0);
             let parallel = (here - met) * per_depth;
             let found = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
-            total += across[i] * along[j] * clamp(found, 0.0, params.reach);
+            total += across[i] * along[j] * clamp(found - shrink * cosine, 0.0, params.reach);
         }
     }
     return total;

@@ -11,11 +11,15 @@ Gaussians of variance v, in mm^2; the shader that is widely copied has exp(-d^2 
 paper, surface diffusion in screen space blurs the sum as if it had entered at the pixels; beside another surface it
 stays sharp.
 
+Rays are taken below x_o, the shrinking of the paper: by as much as half of the light travels in the medium where they
+graze the surface, and by nothing where they come straight through. Else light that enters next to x_o, where E is not 0
+yet, would pass for light from behind, and add a bright seam to what is thick (the RMSE of a ball is 1.3 % with it, 13 %
+without). It also takes off some of what slanting rays are longer than the medium is thick, which is what counts for T.
+
 All that is known of the back is a depth for each ray. What lies in front of an object counts as a part of it, and so
 does the air between: farther than the profile reaches it keeps the light off, as its shadow does; what nearly touches
 lets through what as much of the medium would. Of area lights each part that casts a shadow is a light. The environment
-has no depth map and does not shine through. Where light grazes the surface E is more than 0 on the lit side, too, and d
-next to nothing: thick things gain a seam of light that is not theirs.
+has no depth map and does not shine through.
 """
 
 from __future__ import annotations
@@ -53,13 +57,15 @@ class Transmittance:
         for body in stage.bodies:
             self.table(body)
 
-    def table(self, body: Body) -> tuple[float, Any]:
-        """The thickness, mm, that the table of T of a body's material ends at, and its buffer."""
+    def table(self, body: Body) -> tuple[dict[str, float], Any]:
+        """What a body's material lets through: its lengths, by the names of the shader's parameters, and a buffer."""
 
-        def make() -> tuple[float, Any]:
-            thickness, through = table(body.material.profile)
+        def make() -> tuple[dict[str, float], Any]:
+            profile = body.material.profile
+            thickness, through = table(profile)
             packed = wgsl.load("transmittance/transmit").layout("array<vec3f>").pack(through)
-            return float(thickness[-1]), body.stage.gpu.buffer(packed)
+            lengths = {"reach": float(thickness[-1]), "shrink": float(profile.range(0.5).max())}
+            return lengths, body.stage.gpu.buffer(packed)
 
         return body.stage.shared(("transmittance", id(body.material)), make)
 
@@ -88,14 +94,14 @@ class Transmittance:
 
     def arriving(self, frame: Frame, body: Body, into: Handle | None) -> Handle:
         """What arrives at a body's pixels from behind, W/m^2, as a share of the profile's total; drawn onto `into`."""
-        reach, through = self.table(body)
+        lengths, through = self.table(body)
         where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
         return frame.graph.draw(
             "transmittance/transmit",
             into=into,
             size=frame.size,
             count=6,
-            params={"reach": reach, **where},
+            params={**lengths, **where},
             through=through,
             **frame.seen("where_seen", "normal", "depth"),
             **frame.light_bindings(body),
