@@ -10,6 +10,7 @@ from typing import Any
 
 from wgsss.errors import InputError, unknown
 from wgsss.methods.lambert import Lambert
+from wgsss.methods.local_thickness import LocalThickness
 from wgsss.methods.method import Diffused, Method
 from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
@@ -22,6 +23,7 @@ from wgsss.methods.transmittance import Transmittance
 TRANSLUCENCIES: dict[str, type[Translucency]] = {
     "tsm": TranslucentShadowMaps,
     "transmittance": Transmittance,
+    "thickness": LocalThickness,
     "sam": Adjacency,
 }
 """What estimates M_back. "none" leaves it black."""
@@ -30,6 +32,7 @@ METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
     "deon07": pair(TextureSpace, TranslucentShadowMaps),
     "jimenez15": pair(ScreenSpace, Transmittance),
+    "barre11": pair(Lambert, LocalThickness),
     "jensen02": PointCloud,
     "sam": SpatialAdjacencyMaps,
 }

@@ -1,0 +1,64 @@
+// M_back of one object: at its vertices, and between them at the pixels.
+
+import package::mesh::{Vertex, Surface};
+import package::light::{Light, incident};
+import package::irradiance::{transmitted_environment};
+import package::screen::{direction_to_eye};
+import package::thickness::transport::{Transport, let_out, let_out_environment};
+import package::targets::{RGBA32Float};
+
+override MAPPED: bool = true; // whether the base colour varies over the object
+
+struct Params {
+    world_to_clip: mat4x4f,
+    eye: vec4f,
+    albedo: vec3f, // cDiffuseAlbedo, but for the base colour's map
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> transport: Transport;
+@group(0) @binding(2) var<uniform> surface: Surface;
+@group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(4) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(5) var<storage, read> lights: array<Light>;
+@group(0) @binding(6) var environment: texture_2d<f32>;
+@group(0) @binding(7) var linear_wrap_u: sampler;
+@group(0) @binding(8) var base_color: texture_2d<f32>;
+@group(0) @binding(9) var depth: texture_depth_2d;
+
+const SAME: f32 = 1e-5; // depths that differ by less are of one surface
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) M_back: vec3f,
+}
+
+struct Pixel {
+    @location(0) M_back: RGBA32Float,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = (surface.object_to_world * vec4f(vertex.position, 1.0)).xyz;
+    let n = (surface.object_to_world * vec4f(vertex.normal, 0.0)).xyz;
+    let w_o = direction_to_eye(params.eye, x);
+    var light_out = let_out_environment(transport) * transmitted_environment(environment, linear_wrap_u, -n, 1.0);
+    for (var i = 0u; i < arrayLength(&lights); i++) {
+        let at = incident(lights[i], x);
+        light_out += at.irradiance * let_out(transport, at.direction, n, w_o);
+    }
+    return Varying(params.world_to_clip * vec4f(x, 1.0), params.albedo * light_out * thickness[vertex.welded].rgb);
+}
+
+@fragment
+fn fs(in: Varying) -> Pixel {
+    let texel = vec2u(in.clip.xy);
+    if in.clip.z > textureLoad(depth, texel, 0) + SAME {
+        discard;
+    }
+    if MAPPED {
+        return Pixel(vec4f(in.M_back * textureLoad(base_color, texel, 0).rgb, 1.0));
+    }
+    return Pixel(vec4f(in.M_back, 1.0));
+}

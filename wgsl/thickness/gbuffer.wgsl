@@ -1,0 +1,47 @@
+// The target of a g-buffer of 8 bits a channel that holds one object's translucency.
+
+import package::mesh::{Vertex, Surface};
+import package::thickness::packing::{pack_grey, pack_coloured};
+import package::targets::{RGBA8Unorm};
+
+override COLOURED: bool = true;
+
+struct Params {
+    world_to_clip: mat4x4f,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(4) var depth: texture_depth_2d;
+
+const SAME: f32 = 1e-5; // depths that differ by less are of one surface
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) thickness: vec3f,
+}
+
+struct Pixel {
+    @location(0) stored: RGBA8Unorm,
+}
+
+@vertex
+fn vs(@builtin(vertex_index) i: u32) -> Varying {
+    let vertex = vertices[i];
+    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    return Varying(params.world_to_clip * x, thickness[vertex.welded].rgb);
+}
+
+@fragment
+fn fs(in: Varying) -> Pixel {
+    let texel = vec2u(in.clip.xy);
+    if in.clip.z > textureLoad(depth, texel, 0) + SAME {
+        discard;
+    }
+    if COLOURED {
+        return Pixel(pack_coloured(in.thickness));
+    }
+    return Pixel(pack_grey(in.thickness.g));
+}
