@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from wgsss import __version__
-from wgsss.cli import bake, bench, catalogue, compare, export, info, profile, render
+from wgsss.cli import bake, bench, catalogue, compare, export, info, profile, render, view
 from wgsss.cli.arguments import Parser
 from wgsss.errors import InputError, RenderError, unknown
 
@@ -42,7 +42,7 @@ def _parse(argv: Sequence[str]) -> Any:
     parser = Parser(prog="wgsss", description="Render translucent materials by the methods of published papers.")
     parser.add_argument("--version", action="version", version=f"wgsss {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
-    for module in (render, bake, compare, bench, profile, export, catalogue, info):
+    for module in (render, view, bake, compare, bench, profile, export, catalogue, info):
         module.declare(commands)
     if argv and not argv[0].startswith("-") and argv[0] not in commands.choices:
         raise unknown("command", argv[0], commands.choices)

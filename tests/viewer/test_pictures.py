@@ -1,0 +1,63 @@
+"""Pictures are those of the offscreen command, bit for bit, whatever was shown before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wgsss.gpu import Gpu
+from wgsss.methods import make_method
+from wgsss.rendering import Renderer
+from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, load_scene
+from wgsss.viewer.pictures import LAYERS, Easel
+
+SIZE = (40, 24)
+METHODS = [make_method("sam", {"samples": 2, "select": "top", "surface": "screen"}), make_method("lambert")]
+SCENE = load_scene("wave", vertices=600)
+SUN = DirectionalLight((0.3, -1.0, 0.2), (1.0, 2.0, 3.0))
+CHANGES = {
+    "as it is": SCENE,
+    "camera": replace(SCENE, camera=PerspectiveCamera((60.0, 40.0, 200.0), (0.0, 0.0, 0.0))),
+    "sun": replace(SCENE, lights=(SUN, *[x for x in SCENE.lights if isinstance(x, EnvironmentLight)])),
+    "sky": replace(SCENE, lights=(EnvironmentLight((3.0, 1.0, 0.5)),)),
+    "exposure": replace(SCENE, exposure=1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def easel(gpu: Gpu) -> Easel:
+    return Easel(gpu)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_pictures_are_those_of_the_offscreen_command(gpu: Gpu, easel: Easel, change: str) -> None:
+    scene = CHANGES[change]
+    drawing = easel.draw(scene, METHODS, SIZE, 0.5)
+    for method, picture in zip(METHODS, drawing.pictures, strict=True):
+        assert picture.display is not None
+        wanted = Renderer(scene, method, SIZE, gpu).frame(0.5).display
+        assert drawing.graph.read(picture.display).tobytes() == wanted.tobytes()
+
+
+def test_what_two_methods_share_is_drawn_once(easel: Easel) -> None:
+    drawing = easel.draw(SCENE, METHODS, SIZE)
+    sam, lambert = drawing.pictures
+    names = [item.module.name for item in drawing.graph.ran]
+    assert [names.count(f"frame/{name}") for name in ("gbuffer", "irradiance_pixels", "specular")] == [1, 1, 1]
+    assert {"frame/gbuffer", "frame/specular"} <= {*sam.passes} & {*lambert.passes}
+    assert "sam/gather" in sam.passes and "sam/gather" not in lambert.passes
+
+
+def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
+    scene = replace(SCENE, tone_map="none")
+    for layer in LAYERS[1:]:
+        drawing = easel.draw(scene, METHODS, SIZE, layer=layer)
+        sam, lambert = drawing.pictures
+        aov = Renderer(scene, METHODS[0], SIZE, easel.gpu).frame(aovs=[layer]).aovs[layer]
+        assert sam.display is not None
+        linear = np.clip(aov, 0.0, 1.0)
+        encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        np.testing.assert_allclose(drawing.graph.read(sam.display)[..., :3] / 255.0, encoded, atol=1.01 / 255.0)
+        assert (lambert.display is None) == (layer == "M_back")

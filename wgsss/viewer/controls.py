@@ -1,0 +1,112 @@
+"""What a pointer does to cameras and lights. Distances on the screen are in heights of the picture, y up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, OrthographicCamera, RectLight, Scene
+from wgsss.scene.light import Light
+
+Array = npt.NDArray[np.float64]
+
+TURN = 180.0
+"""degrees, across a height"""
+STEEPEST = 88.0
+"""degrees above and below the horizon that orbits reach"""
+
+
+def orbit(camera: Camera, right: float, up: float) -> Camera:
+    """The eye moved round the target, so that what is in front follows the pointer."""
+    arm = np.subtract(camera.eye, camera.target)
+    pole = _unit(np.asarray(camera.up, np.float64))
+    elevation = math.degrees(math.asin(np.clip(arm @ pole / np.linalg.norm(arm), -1.0, 1.0)))
+    higher = float(np.clip(elevation - TURN * up, -STEEPEST, STEEPEST)) - elevation
+    across = _unit(np.cross(pole, arm))
+    arm = _turned(_turned(arm, across, -higher), pole, -TURN * right)
+    return replace(camera, eye=_triple(camera.target + arm))
+
+
+def pan(camera: Camera, right: float, up: float) -> Camera:
+    """Eye and target moved across the view, so that what is at the target's distance follows the pointer."""
+    view = camera.view()
+    step = -height_at_target(camera) * (right * view[0, :3] + up * view[1, :3])
+    return replace(camera, eye=_triple(camera.eye + step), target=_triple(camera.target + step))
+
+
+def zoom(camera: Camera, factor: float) -> Camera:
+    """The picture's middle `factor` times as large."""
+    if isinstance(camera, OrthographicCamera):
+        return replace(camera, height=max(camera.height / factor, 1e-6))
+    arm = np.subtract(camera.eye, camera.target) / factor
+    return replace(camera, eye=_triple(camera.target + arm)) if np.linalg.norm(arm) > 1e-6 else camera
+
+
+def focus(camera: Camera, point: Any) -> Camera:
+    """The target at a point, seen from the same side and distance."""
+    step = np.subtract(point, camera.target)
+    return replace(camera, eye=_triple(camera.eye + step), target=_triple(point))
+
+
+def height_at_target(camera: Camera) -> float:
+    """What the picture spans at the target's distance, mm."""
+    if isinstance(camera, OrthographicCamera):
+        return camera.height
+    distance = float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
+    return 2.0 * distance * math.tan(math.radians(camera.fov) / 2.0)
+
+
+def turn_light(light: Light, camera: Camera, right: float, up: float, centre: Any) -> Light:
+    """A light moved over the sphere of directions about `centre`, as if the pointer turned that sphere."""
+    if isinstance(light, EnvironmentLight):
+        return replace(light, rotation=(light.rotation + TURN * right) % 360.0)
+    view = camera.view()
+
+    def moved(vector: Any) -> Any:
+        return _triple(
+            _turned(_turned(np.asarray(vector, np.float64), view[1, :3], TURN * right), view[0, :3], -TURN * up)
+        )
+
+    if isinstance(light, DirectionalLight):
+        return replace(light, direction=moved(light.direction))
+    place = _triple(np.asarray(centre) + moved(np.subtract(light.position, centre)))
+    if isinstance(light, RectLight):
+        return replace(light, position=place, direction=moved(light.direction), up=moved(light.up))
+    return replace(light, position=place)
+
+
+def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
+    """The nearest point of a still scene's surface, world mm, at -1 to 1 across and up the picture; None: nothing."""
+    from trimesh import Trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    camera = scene.camera
+    to_world = np.linalg.inv(camera.projection(aspect, 1.0, 2.0) @ camera.view())
+    near, far = ((to_world @ (right, up, depth, 1.0)) for depth in (0.0, 1.0))
+    start, towards = near[:3] / near[3], _unit(far[:3] / far[3] - near[:3] / near[3])
+    start = start - towards * (
+        float(np.ptp(scene.bounds, axis=0).max()) if isinstance(camera, OrthographicCamera) else 0
+    )
+    hits = []
+    for thing in scene.objects:
+        caster = RayMeshIntersector(Trimesh(thing.placed, thing.mesh.faces, process=False, validate=False))
+        hits += list(caster.intersects_location([start], [towards], multiple_hits=False)[0])
+    return min(hits, key=lambda hit: float((hit - start) @ towards), default=None)
+
+
+def _turned(vector: Array, axis: Array, degrees: float) -> Array:
+    """Counter-clockwise seen from the tip of the unit axis (Rodrigues)."""
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1.0 - cos)
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.linalg.norm(vector)
+
+
+def _triple(vector: Any) -> Any:
+    return tuple(float(x) for x in vector)

@@ -1,0 +1,120 @@
+"""What the viewer shows, and the command that draws the same."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from wgsss.methods import Method, make_method, name_of
+from wgsss.scene import Scene, load_scene
+from wgsss.scene.loading import with_material, with_view
+from wgsss.scene.scenefile import CAMERAS, LIGHTS
+
+SPLIT, LEFT, RIGHT, ERROR = COMPARISONS = ("split", "left", "right", "error")
+"""both beside the divider, one of the two, or how far they are from each other"""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scene is from, as on the command line."""
+
+    scene: str
+    size_mm: float | None = None
+    vertices: int | None = None
+
+    def load(self) -> Scene:
+        return load_scene(self.scene, size_mm=self.size_mm, vertices=self.vertices)
+
+
+@dataclass
+class State:
+    """All that is shown. `opened` is the scene as it was loaded, `material` what took the place of its materials."""
+
+    source: Source
+    methods: list[Method]
+    """of the left and of the right side"""
+    opened: Scene
+    scene: Scene
+    material: str | dict[str, Any] | None = None
+    comparison: str = SPLIT
+    divider: float = 0.5
+    """share of the width that is the left side's"""
+    layer: str = "image"
+    time_s: float = 0.0
+    playing: bool = False
+    is_measured: bool = False
+    """whether a reference is estimated for the view, to tell errors"""
+    notes: list[str] = field(default_factory=list)
+    """what went wrong, the last first"""
+
+    @classmethod
+    def open(
+        cls,
+        source: Source,
+        methods: Sequence[Method],
+        material: str | dict[str, Any] | None = None,
+        camera: dict[str, Any] | None = None,
+        lights: Sequence[dict[str, Any]] = (),
+    ) -> State:
+        """A scene with what takes the place of its own, as of `load_scene`. Raises InputError for what is wrong."""
+        scene = source.load()
+        state = cls(source, list(methods), scene, with_view(scene, camera, lights))
+        if material is not None:
+            state.wear(material)
+        return state
+
+    def wear(self, material: str | dict[str, Any]) -> None:
+        """All objects of another material: a name, a file, or a table of one. Raises InputError where there is none."""
+        self.scene = replace(with_material(self.opened, material), camera=self.scene.camera, lights=self.scene.lights)
+        self.material = material
+
+    def reset(self) -> None:
+        """Camera and lights as they were."""
+        self.scene = replace(self.scene, camera=self.opened.camera, lights=self.opened.lights)
+
+    def command(self, side: int, size: tuple[int, int]) -> str:
+        """The command line that draws a side as it is shown, its layer aside."""
+        source, scene, method = self.source, self.scene, self.methods[side]
+        words = ["wgsss", "render", source.scene]
+        for option, value in (("--size-mm", source.size_mm), ("--vertices", source.vertices)):
+            words += [] if value is None else [option, repr(value)]
+        if self.material is not None:
+            words += ["--material", self.material if isinstance(self.material, str) else toml(self.material)]
+        if scene.camera != self.opened.camera:
+            words += ["--camera", _table(scene.camera, CAMERAS)]
+        if scene.lights != self.opened.lights:
+            words += [word for light in scene.lights for word in ("--light", _table(light, LIGHTS))]
+        if scene.exposure != self.opened.exposure:
+            words += ["--exposure", repr(scene.exposure)]
+        if scene.tone_map != self.opened.tone_map:
+            words += ["--tone-map", scene.tone_map]
+        name = name_of(method)
+        words += ["--method", name]
+        for knob, value in vars(method).items():
+            if value != vars(make_method(name))[knob]:
+                words += ["--set", f"{knob}={value}"]
+        if self.time_s:
+            words += ["--time", repr(self.time_s)]
+        return shlex.join([*words, "--size", f"{size[0]}x{size[1]}"])
+
+
+def toml(value: Any) -> str:
+    """A value as TOML in one line."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {toml(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml(item) for item in value)}]"
+    if isinstance(value, Path):
+        value = str(value)
+    return json.dumps(value) if isinstance(value, str | bool) else repr(value)
+
+
+def _table(thing: Any, kinds: dict[str, Any]) -> str:
+    """A camera or a light as a scene file has it."""
+    kind = next(name for name, kind in kinds.items() if kind is type(thing))
+    values = {f.name: getattr(thing, f.name) for f in fields(thing)}
+    return toml({"kind": kind, **{name: value for name, value in values.items() if value is not None}})
