@@ -89,7 +89,7 @@ def desk(folder: Path, *argv: str) -> Iterator[Desk]:
     with os.fdopen(read) as found:
         display = f":{found.readline().strip()}"
     output = folder / "said.txt"
-    env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+    env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder)}
     try:
         with output.open("w") as file:
             program = subprocess.Popen(

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from wgsss.scene import DirectionalLight, EnvironmentLight, OrthographicCamera, PerspectiveCamera, PointLight, RectLight
+from wgsss.scene import (
+    DirectionalLight,
+    EnvironmentLight,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    RectLight,
+    load_scene,
+)
 from wgsss.viewer import controls
 
 FRONT = PerspectiveCamera((0.0, 0.0, 100.0), (0.0, 0.0, 0.0), fov=30.0)
@@ -72,3 +81,15 @@ def test_a_rectangle_goes_on_facing_what_it_faced() -> None:
 def test_an_environment_turns_about_the_vertical() -> None:
     light = EnvironmentLight(rotation=350.0)
     assert controls.turn_light(light, FRONT, 0.5, 0.7, (0, 0, 0)).rotation == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize("camera", [FRONT, FLAT, controls.orbit(FRONT, 0.1, 0.15)])
+def test_what_is_picked_is_what_is_projected_there(camera: Any) -> None:
+    scene = replace(load_scene("sphere", vertices=2000), camera=camera)
+    right, up = 0.1, -0.05
+    point = controls.pick(scene, 1.5, right, up)
+    np.testing.assert_allclose(controls.project(camera, 1.5, point), (right, up), atol=1e-6)
+    radius = np.ptp(scene.bounds, axis=0)[0] / 2
+    assert np.linalg.norm(point) == pytest.approx(radius, rel=0.01)
+    assert np.subtract(camera.eye, point) @ point > 0.0, "the near side"
+    assert controls.pick(scene, 1.5, 0.99, 0.99) is None

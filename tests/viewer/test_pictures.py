@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wgsss.bake.thickness import local_thickness
 from wgsss.gpu import Gpu
 from wgsss.methods import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, load_scene
+from wgsss.viewer.layers import SCENE_LAYERS
 from wgsss.viewer.pictures import LAYERS, Easel
 
 SIZE = (40, 24)
@@ -52,7 +54,7 @@ def test_what_two_methods_share_is_drawn_once(easel: Easel) -> None:
 
 def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
     scene = replace(SCENE, tone_map="none")
-    for layer in LAYERS[1:]:
+    for layer in set(LAYERS[1:]) - set(SCENE_LAYERS):
         drawing = easel.draw(scene, METHODS, SIZE, layer=layer)
         sam, lambert = drawing.pictures
         aov = Renderer(scene, METHODS[0], SIZE, easel.gpu).frame(aovs=[layer]).aovs[layer]
@@ -61,3 +63,36 @@ def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
         encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         np.testing.assert_allclose(drawing.graph.read(sam.display)[..., :3] / 255.0, encoded, atol=1.01 / 255.0)
         assert (lambert.display is None) == (layer == "M_back")
+
+
+def test_layers_of_the_scene_are_the_same_for_all_methods(gpu: Gpu) -> None:
+    scene = load_scene("sphere", vertices=500)
+    drawing = Easel(gpu).draw(scene, METHODS, SIZE, layer="thickness")
+    first, second = drawing.pictures
+    assert first.display is second.display and first.display is not None
+    shown = drawing.graph.read(first.display)
+    assert (shown[..., 3] > 0).sum() == drawing.seen.sum()
+    thickness = local_thickness(scene.objects[0].mesh, scene.objects[0].material.profile).mean(axis=0)
+    encoded = np.where(thickness <= 0.0031308, 12.92 * thickness, 1.055 * thickness ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(shown[drawing.seen][:, :3].mean(axis=0) / 255.0, encoded, atol=0.02)
+
+
+def test_a_shadow_map_shows_what_the_light_sees(gpu: Gpu) -> None:
+    easel = Easel(gpu)
+    scene = replace(load_scene("sphere", vertices=500), lights=(SUN,))
+    drawing = easel.draw(scene, METHODS[1:], SIZE, layer="shadow map")
+    display = drawing.pictures[0].display
+    assert display is not None
+    lit = drawing.graph.read(display)[..., 3] > 0
+    assert lit.mean() == pytest.approx(np.pi / 4 / 1.02**2, rel=0.03), "a disc that fits"
+    dark = easel.draw(replace(scene, lights=(EnvironmentLight(),)), METHODS[1:], SIZE, layer="shadow map")
+    assert dark.pictures[0].display is None
+
+
+def test_the_stretch_of_a_plane_is_even(gpu: Gpu) -> None:
+    drawing = Easel(gpu).draw(load_scene("slab", vertices=300), METHODS[1:], SIZE, layer="UV stretch")
+    display = drawing.pictures[0].display
+    assert display is not None
+    colours = drawing.graph.read(display)[drawing.seen][:, :3]
+    middle = np.round(255 * np.array([0.865, 0.865, 0.865]))
+    assert np.abs(colours - middle).max() < 12, "the middle of the map's colours, as 0.865 of each channel"

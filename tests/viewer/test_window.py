@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -132,3 +133,5 @@ def test_q_closes_it(tmp_path: Path) -> None:
         opened.do("mousemove", 400, 150, "key", "q")
         assert opened.program.wait(20) == 0
         assert "rror" not in opened.said()
+    kept = json.loads((tmp_path / "wgsss" / "viewer.json").read_text())
+    assert kept == {"size": [500, 300], "open": ["left", "passes", "right"]}

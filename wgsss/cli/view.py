@@ -16,7 +16,7 @@ def declare(commands: Any) -> None:
     arguments.add_method(parser)
     add = parser.add_argument
     add("--against", metavar="NAME", default="lambert", help=_AGAINST)
-    add("--size", metavar="WxH", type=arguments.size, default=(960, 540), help="of the window (default: 960x540)")
+    add("--size", metavar="WxH", type=arguments.size, help="of the window (default: as it was the last time)")
 
 
 def _other(text: str) -> Any:

@@ -36,14 +36,15 @@ class Pair:
     parts: ClassVar[tuple[type[Method], type[Translucency]]]
 
     def bake(self, stage: Stage) -> None:
-        for part in self._made():
+        for part in self.made():
             part.bake(stage)
 
     def passes(self, frame: Frame) -> Diffused:
-        surface, translucency = self._made()
+        surface, translucency = self.made()
         return replace(surface.passes(frame), M_back=translucency.M_back(frame, surface))
 
-    def _made(self) -> tuple[Method, Translucency]:
+    def made(self) -> tuple[Method, Translucency]:
+        """The two parts with their knobs set."""
         surface, translucency = self.parts
         return surface(**self._knobs(surface)), translucency(**self._knobs(translucency))
 

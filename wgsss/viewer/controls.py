@@ -98,6 +98,12 @@ def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
     return min(hits, key=lambda hit: float((hit - start) @ towards), default=None)
 
 
+def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:
+    """Where a point, world mm, is in the picture: -1 to 1 across and up."""
+    clip = camera.projection(aspect, 1.0, 2.0) @ camera.view() @ np.append(point, 1.0)
+    return float(clip[0] / clip[3]), float(clip[1] / clip[3])
+
+
 def _turned(vector: Array, axis: Array, degrees: float) -> Array:
     """Counter-clockwise seen from the tip of the unit axis (Rodrigues)."""
     cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

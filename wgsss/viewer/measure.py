@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from wgsss.study.error_maps import coloured
@@ -43,8 +42,3 @@ def measure(drawing: Drawing, sides: Sequence[Picture | None], known: Known | No
     if left is None or right is None:
         return Measured(found, None)
     return Measured(found, coloured(error_map(left, right, seen), seen, WHOLE))
-
-
-def legend() -> Array:
-    """uint8 (1, 256, 4): the colours of a map from no error to WHOLE."""
-    return coloured(np.linspace(0.0, 1.0, 256)[None] ** 2 * WHOLE, np.ones((1, 256), bool), WHOLE)

@@ -24,9 +24,12 @@ ctrl drag  light     wheel, + -  zoom
 double click, F  look there     R  reset
 1 2 3 4  split, left, right, error     Tab  flicker
 X  swap sides     L  next layer
+E  senders of the vertex under the pointer
 space  play     .  step
 S  screenshot     C  copy as command     Q  close"""
 _SIDES = "left", "right"
+OPEN = {*_SIDES, "passes"}
+"""panels that are open the first time"""
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 
@@ -42,26 +45,29 @@ def panels(window: Window) -> None:
     imgui.push_item_width(-110)
     _compared(window)
     for side, name in enumerate(_SIDES):
-        if imgui.collapsing_header(f"{name}: {name_of(window.state.methods[side])}", imgui.TreeNodeFlags_.default_open):
+        if _panel(window, name, f"{name}: {name_of(window.state.methods[side])}"):
             imgui.push_id(side)
             _method(window, side)
             imgui.pop_id()
-    for title, declare, is_open in (
-        ("light", _light, False),
-        ("material", _material, False),
-        ("time", _time, False),
-        ("errors", _errors, False),
-        ("passes", _passes, True),
-        ("keys", _keys, False),
-    ):
-        if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open if is_open else 0):
-            imgui.push_id(title)
+    for name, declare in _MORE.items():
+        if _panel(window, name, name):
+            imgui.push_id(name)
             declare(window)
             imgui.pop_id()
     for note in window.state.notes:
         imgui.text_wrapped(note)
     imgui.pop_item_width()
     imgui.end()
+
+
+def _panel(window: Window, name: str, title: str) -> bool:
+    """A heading, and whether what is under it is to be declared."""
+    from imgui_bundle import imgui
+
+    imgui.set_next_item_open(name in window.open_panels, imgui.Cond_.once)
+    is_open: bool = imgui.collapsing_header(f"{title}###{name}")
+    (window.open_panels.add if is_open else window.open_panels.discard)(name)
+    return is_open
 
 
 def _choice(label: str, value: str, choices: Any) -> str:
@@ -248,3 +254,6 @@ def _keys(window: Window) -> None:
     from imgui_bundle import imgui
 
     imgui.text(KEYS)
+
+
+_MORE = {"light": _light, "material": _material, "time": _time, "errors": _errors, "passes": _passes, "keys": _keys}

@@ -16,10 +16,11 @@ from wgsss.methods import Method
 from wgsss.rendering import AOVS, draw
 from wgsss.scene import EnvironmentLight, Scene
 from wgsss.stage import Stage
+from wgsss.viewer.layers import SCENE_LAYERS, scene_layer
 
 Array = npt.NDArray[Any]
 
-LAYERS = ("image", *(name for name in AOVS if name != "depth"))
+LAYERS = ("image", *(name for name in AOVS if name != "depth"), *SCENE_LAYERS)
 """what may be shown of a picture"""
 
 
@@ -94,9 +95,12 @@ class Easel:
         graph = Graph(self.gpu)
         frame = shared.begin(graph, stage, size)
         found = []
+        common = scene_layer(frame, layer) if layer in SCENE_LAYERS else None
         for drawn in [draw(frame, method) for method in methods]:
             display: Handle | None = drawn.display
-            if layer != "image":  # as if it were light that is seen
+            if layer in SCENE_LAYERS:
+                display = common
+            elif layer != "image":  # as if it were light that is seen
                 light = drawn.layers[layer]
                 display = light and shared.tone_map(graph, light, scene.exposure, scene.tone_map)
             M = tuple(h for h in (drawn.layers["M_front"], drawn.layers["M_back"]) if h is not None)

@@ -46,6 +46,8 @@ class State:
     layer: str = "image"
     time_s: float = 0.0
     playing: bool = False
+    shows_entries: bool = False
+    """whether lines go from the vertex under the pointer to the senders of its spatial adjacency map"""
     is_measured: bool = False
     """whether a reference is estimated for the view, to tell errors"""
     notes: list[str] = field(default_factory=list)

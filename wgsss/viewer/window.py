@@ -15,10 +15,12 @@ from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
 from wgsss.methods import Method
 from wgsss.reference import REFERENCES, Integral
-from wgsss.viewer import controls
-from wgsss.viewer.measure import Measured, measure
+from wgsss.study import error_maps
+from wgsss.viewer import controls, memory
+from wgsss.viewer.entries import adjacency, links
+from wgsss.viewer.measure import WHOLE, Measured, measure
 from wgsss.viewer.pace import STILL_S, Pace
-from wgsss.viewer.panels import PANEL_WIDTH, panels
+from wgsss.viewer.panels import OPEN, PANEL_WIDTH, panels
 from wgsss.viewer.pictures import LAYERS, Drawing, Easel, Picture
 from wgsss.viewer.reload import Shaders
 from wgsss.viewer.sheet import Sheet
@@ -26,6 +28,8 @@ from wgsss.viewer.state import COMPARISONS, ERROR, LEFT, RIGHT, SPLIT, Source, S
 from wgsss.viewer.truth import Known, Truth, View
 from wgsss.wgsl import WgslError
 
+SIZE = 960, 540
+"""of the window, logical pixels, the first time"""
 GRIP = 8
 """logical pixels to either side of the divider where it can be dragged"""
 POLL_S = 0.2
@@ -50,7 +54,8 @@ def loop() -> Any:
 class Window:
     """A window on a state. Drawn when something has changed, and while something moves."""
 
-    def __init__(self, state: State, gpu: Gpu, size: tuple[int, int]) -> None:
+    def __init__(self, state: State, gpu: Gpu, size: tuple[int, int] | None = None) -> None:
+        """`size` in logical pixels: by default what it was the last time."""
         from imgui_bundle import implot
         from rendercanvas.glfw import RenderCanvas
         from wgpu.utils.imgui import ImguiRenderer
@@ -66,18 +71,23 @@ class Window:
         """share of the full size that the pictures have"""
         self.seconds = 0.0
         """that the last picture took"""
+        remembered = memory.recall()
+        self.open_panels = set(remembered.get("open", OPEN))
         self._drawn: Any = None
         """the view that was drawn last, how finely, and with which reference"""
         self._last_known: Known | None = None
+        self._present: list[Method] = []
         self._changed_s = -1.0
+        self._size: tuple[float, float] = SIZE
         self._dragged = ""
         self._at = (0.0, 0.0)
         self._clock = time.perf_counter()
+        size = size or tuple(remembered.get("size", SIZE))
         self.canvas = RenderCanvas(size=size, title=f"wgsss: {state.source.scene}", update_mode="ondemand")
         self.ui = ImguiRenderer(gpu.device, self.canvas, "bgra8unorm")
         implot.create_context()
         self.sheets = Sheet(gpu, self.ui.backend), Sheet(gpu, self.ui.backend)
-        self.map = Sheet(gpu, self.ui.backend)
+        self.map, self.colours = Sheet(gpu, self.ui.backend), Sheet(gpu, self.ui.backend)
         self.ui.set_gui(self._gui)
         handle = self.canvas.add_event_handler
         handle(self._on_pointer, "pointer_down", "pointer_move", "pointer_up")
@@ -92,6 +102,7 @@ class Window:
         """Until the window is closed."""
         loop().run()
         self.truth.close()
+        memory.remember({"size": self._size, "open": sorted(self.open_panels)})
 
     def refresh(self) -> None:
         """Draw again soon."""
@@ -125,6 +136,7 @@ class Window:
         self._clock = now
         if self.shaders.changed():
             self._drawn = None
+        self._size = self.canvas.get_logical_size()
         self._paint()
         self.ui.render()
         if self.state.playing or not self._is_done():
@@ -157,6 +169,7 @@ class Window:
         size = max(int(width * scale), 1), max(int(height * scale), 1)
         methods = [known if _is_reference(m) else m for m in state.methods]
         present = [m for m in methods if m is not None]
+        self._present = present
         try:
             self.drawing = self.easel.draw(state.scene, present, size, state.time_s, state.layer, timed=True)
             self.gpu.fence()
@@ -228,7 +241,46 @@ class Window:
         if state.comparison == SPLIT:
             x = left + state.divider * across
             behind.add_line((x, top), (x, top + down), imgui.IM_COL32(255, 255, 255, 160), 1.0)
+        if state.comparison == ERROR:
+            self._legend(behind)
+        elif state.shows_entries:
+            self._entries(behind)
         panels(self)
+
+    def _legend(self, behind: Any) -> None:
+        """The colours of the map of errors."""
+        from imgui_bundle import imgui
+
+        left, top, across, down = self.region
+        if self.colours.reference is None:
+            self.colours.write(error_maps.bar())
+        x, y, length = left + 0.2 * across, top + down - 40.0, 0.6 * across
+        behind.add_image(self.colours.reference, (x, y), (x + length, y + 10))
+        for share, text in error_maps.ticks(WHOLE):
+            behind.add_text((x + share * length - 8, y + 14), imgui.IM_COL32(255, 255, 255, 255), text)
+
+    def _entries(self, behind: Any) -> None:
+        """Lines from the vertex under the pointer to where it reads from, as wide as they weigh."""
+        from imgui_bundle import imgui
+
+        maps = adjacency(self.state.methods[self.side])
+        point = None if maps is None else self.pick(*self._at)
+        if maps is None or point is None:
+            return
+        stage = self.easel.stage(self.state.scene, self._present, self.state.time_s)
+        found = links(stage, maps, point)
+        start = self._on_screen(found.vertex)
+        most = max(float(found.weights.max(initial=0.0)), 1e-30)
+        for place, weight in zip(found.senders, found.weights, strict=True):
+            end, share = self._on_screen(place), float(weight) / most
+            behind.add_line(start, end, imgui.IM_COL32(90, 220, 255, 255), 1.0 + 4.0 * share)
+            behind.add_text(end, imgui.IM_COL32(255, 255, 255, 255), f"{weight:.3g}")
+        behind.add_circle_filled(start, 4.0, imgui.IM_COL32(255, 200, 60, 255))
+
+    def _on_screen(self, point: Any) -> tuple[float, float]:
+        left, top, across, down = self.region
+        right, up = controls.project(self.camera, across / down, point)
+        return left + 0.5 * (1.0 + right) * across, top + 0.5 * (1.0 - up) * down
 
     # input
 
@@ -323,6 +375,8 @@ class Window:
             state.methods.reverse()
         elif key == "l":
             state.layer = LAYERS[(LAYERS.index(state.layer) + 1) % len(LAYERS)]
+        elif key == "e":
+            state.shows_entries = not state.shows_entries
         elif key == "r":
             state.reset()
         elif key == "f":
@@ -346,7 +400,16 @@ class Window:
     def drop(self, paths: list[str]) -> None:
         """Open a scene or a mesh, or wear a material, from files dropped on the window."""
         for path in paths:
-            self.attempt(partial(self.open, Source(path)))
+            self.attempt(partial(self._take, path))
+
+    def _take(self, path: str) -> None:
+        """A scene where it is one, else a material."""
+        try:
+            self.open(Source(path))
+        except InputError:
+            if Path(path).suffix.lower() != ".toml":
+                raise
+            self.state.wear(path)
 
     def open(self, source: Source) -> None:
         """Show another scene. Raises InputError for what is wrong with it."""

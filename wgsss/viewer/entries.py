@@ -1,0 +1,56 @@
+"""What a vertex has in its spatial adjacency map, as lines to where it reads from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.methods import Method
+from wgsss.methods.pair import Pair
+from wgsss.methods.sam import Adjacency
+from wgsss.methods.sam_motion import places_at_rest
+from wgsss.stage import Stage
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """Of one vertex, world mm, at rest."""
+
+    vertex: Array
+    """(3,)"""
+    senders: Array
+    """(n, 3): where they are; of a mean, its middle"""
+    weights: Array
+    """(n,): the mean of the channels"""
+
+
+def adjacency(method: Method) -> Adjacency | None:
+    """What of a method has spatial adjacency maps."""
+    if isinstance(method, Pair):
+        return next((part for part in method.made() if isinstance(part, Adjacency)), None)
+    return method if isinstance(method, Adjacency) else None
+
+
+def links(stage: Stage, maps: Adjacency, point: Any) -> Links:
+    """Those of the vertex nearest to a point, world mm."""
+
+    def nearest(index: int) -> tuple[float, int]:
+        distance = np.linalg.norm(stage.scene.objects[index].placed - point, axis=1)
+        return float(distance.min()), int(distance.argmin())
+
+    index = min(range(len(stage.bodies)), key=lambda i: nearest(i)[0])
+    body, vertex = stage.bodies[index], nearest(index)[1]
+    entries, matrix = maps.map(body), body.rest.matrix
+    used = entries.sender[vertex] >= 0
+    sender = entries.sender[vertex][used]
+    if entries.blend is not None:  # of a blend, the node that it takes the place of
+        node = entries.blend.node[np.maximum(sender - entries.senders, 0), 0]
+        sender = np.where(sender < entries.senders, sender, entries.senders + node)
+    places = stage.shared(("places", id(entries)), lambda: places_at_rest(body.rest.mesh, entries)["position"])
+    at = places[sender] @ matrix[:3, :3].T + matrix[:3, 3]
+    return Links(body.rest.placed[vertex], at, entries.weight[vertex][used].mean(axis=1))
