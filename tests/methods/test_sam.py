@@ -46,9 +46,11 @@ class Passes:
         gathers = [p for p in graph.passes if p.module.name == "sam/gather"]
         # Of a map in parts the last pass has all.
         gathers = [p for p in gathers if p.writes["M_back"].version == p.writes["M_back"].resource.version]
+        mixes = [p.writes["M_back"] for p in graph.passes if p.module.name == "sam/mix"]
         read = [h for p in gathers for h in (p.writes["M_back"], p.reads["irradiance"])]
-        graph.run(*read, diffused.M_front, *([diffused.M_back] if diffused.M_back else []))
+        graph.run(*read, *mixes, diffused.M_front, *([diffused.M_back] if diffused.M_back else []))
         self.at_vertices = [graph.read(h)[:, :3] for h in read[::2]]
+        self.mixed = graph.read(mixes[-1])[:, :3] if mixes else None
         self.irradiance = [graph.read(h) for h in read[1::2]]
         self.M_back = diffused.M_back and graph.read(diffused.M_back)
         self.ran = [p.module.name for p in graph.ran]
@@ -75,14 +77,17 @@ def test_vertices_receive_what_their_entries_read(gpu, monkeypatch, vertices, fe
 def test_fitted_entries_read_means_that_fade_into_their_neighbours(gpu):
     stage = Stage(gpu, lit(SIDE, mesh=ear(500), material=MARBLE, camera=FRONT))
     method, mesh = replace(PLAIN, select="fit"), stage.bodies[0].rest.mesh
-    (M,) = Passes(stage, method).at_vertices
+    passes = Passes(stage, method)
+    (M,) = passes.at_vertices
     entries, light, area = method.map(stage.bodies[0]), light_at_vertices(stage)[:, :3], fan_areas(mesh)
     assert (entries.sender >= entries.senders).mean() > 0.3
     means = entries.tree.sums(light * area[:, None]) / entries.tree.sums(area)[:, None]
     read = np.concatenate([light, entries.blend.of(means)])
-    wanted = np.einsum("vnc,vnc->vc", entries.weight, read[np.maximum(entries.sender, 0)])
-    assert M.max() > 0.1
-    np.testing.assert_allclose(M, wanted, rtol=1e-4, atol=1e-5)
+    gathered = np.einsum("vnc,vnc->vc", entries.weight, read[np.maximum(entries.sender, 0)])
+    np.testing.assert_allclose(M, gathered, rtol=1e-4, atol=1e-5)
+    mixed = np.einsum("vk,vkc->vc", entries.mix.weight.astype(float), gathered[entries.mix.vertex]) * entries.mix.tint
+    assert mixed.max() > 0.1 and np.abs(mixed - gathered).max() > 0.01
+    np.testing.assert_allclose(passes.mixed, mixed, rtol=1e-4, atol=1e-5)
 
 
 def test_in_even_light_they_receive_the_sum_of_their_weights(gpu):

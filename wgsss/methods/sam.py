@@ -127,7 +127,17 @@ class Adjacency:
                 last=last.M_back,
                 **({} if M_back is None else {"M_back": M_back}),
             )
-        return M_back
+        gathered, mixed = M_back, None
+        for block in plan.blocks if plan.entries.mix else ():
+            mixed = graph.dispatch(
+                "sam/mix",
+                size=V if mixed is None else block.count,
+                vertices=block.vertices,
+                mixes=block.mixes,
+                gathered=gathered,
+                **({} if mixed is None else {"M_back": mixed}),
+            )
+        return mixed or gathered
 
 
 @dataclass(frozen=True)

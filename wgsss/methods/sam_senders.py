@@ -14,6 +14,7 @@ from wgsss.bake.sam import Entries
 from wgsss.bake.sam.blend import Blend
 from wgsss.bake.sam.entries import BYTES
 from wgsss.bake.sam.fans import fan_areas
+from wgsss.bake.sam.mix import MIX_BYTES, Mix
 from wgsss.bake.samples import Samples
 from wgsss.gpu import LIMITS, Gpu
 from wgsss.graph import Graph
@@ -34,6 +35,8 @@ class Block:
     """buffer of array<Entry> (wgsl/sam/entries.wgsl)"""
     moved: Any
     """buffer of i32: the senders that they have, from frame to frame, where they may change"""
+    mixes: Any
+    """buffer of array<Mix> (wgsl/sam/mix.wgsl), where there is a mix"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
     places = np.full(entries.senders, -1, np.int32)
     places[needed] = np.arange(len(needed))
     named = np.concatenate([places, len(points.face) + np.arange(means), [-1]])  # of no sender, -1, is the last
-    blocks = _blocks(gpu, vertices, named[entries.sender[vertices]], entries.weight[vertices])
+    blocks = _blocks(gpu, vertices, named[entries.sender[vertices]], entries)
     corners = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
     if tree is None:
         return Plan(entries, points, blocks, corners)
@@ -125,18 +128,29 @@ def _needed(entries: Entries) -> Array:
     return np.flatnonzero(is_read)
 
 
-def _blocks(gpu: Gpu, vertices: Array, sender: Array, weight: Array) -> list[Block]:
+def _blocks(gpu: Gpu, vertices: Array, sender: Array, entries: Entries) -> list[Block]:
     layout = wgsl.load("sam/gather").layout("array<Entry>")
-    most = LIMITS["max-storage-buffer-binding-size"] // (BYTES * sender.shape[1])
+    most = LIMITS["max-storage-buffer-binding-size"] // max(BYTES * sender.shape[1], MIX_BYTES)
     found = []
     for first in range(0, len(vertices), most):
         some = slice(first, first + most)
-        entries = layout.pack({"weight": weight[some].reshape(-1, 3), "sender": sender[some].ravel()})
-        buffers = [
-            gpu.buffer(data) for data in (vertices[some].astype(np.uint32), entries, sender[some].astype(np.int32))
-        ]
-        found.append(Block(len(vertices[some]), *buffers))
+        weight = entries.weight[vertices[some]].reshape(-1, 3)
+        found.append(
+            Block(
+                len(vertices[some]),
+                gpu.buffer(vertices[some].astype(np.uint32)),
+                gpu.buffer(layout.pack({"weight": weight, "sender": sender[some].ravel()})),
+                gpu.buffer(sender[some].astype(np.int32)),
+                None if entries.mix is None else _mixes(gpu, entries.mix, vertices[some]),
+            )
+        )
     return found
+
+
+def _mixes(gpu: Gpu, mix: Mix, vertices: Array) -> Any:
+    layout = wgsl.load("sam/mix").layout("array<Mix>")
+    halves = np.concatenate([mix.weight[vertices], mix.tint[vertices]], axis=1)
+    return gpu.buffer(layout.pack({"vertex": mix.vertex[vertices], "halves": halves.view(np.uint32)}))
 
 
 def _blends(gpu: Gpu, blend: Blend) -> Any:

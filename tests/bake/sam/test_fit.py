@@ -32,7 +32,8 @@ def received(entries, light: np.ndarray, area: np.ndarray) -> np.ndarray:
     if entries.tree is not None:
         means = entries.tree.sums(light * area) / entries.tree.sums(area)
         at = np.concatenate([light, entries.blend.of(means)])
-    return np.einsum("vn,vnc->vc", np.where(entries.sender < 0, 0.0, at[entries.sender]), entries.weight)
+    gathered = np.einsum("vn,vnc->vc", np.where(entries.sender < 0, 0.0, at[entries.sender]), entries.weight)
+    return gathered if entries.mix is None else entries.mix.of(gathered)
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from wgsss.bake.sam.entries import BYTES, Entries
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.fit import select_fit
 from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.sam.mix import MIX_BYTES, mix
 from wgsss.bake.sam.nonnegative import nonnegative
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.pursuit import pursue
@@ -48,8 +49,8 @@ _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,
     "fit": (
-        *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends"),
-        *(QuickFormFactors, blend, nonnegative, pursue, senders, training, tree),
+        *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends", "sam/mix"),
+        *(QuickFormFactors, blend, mix, nonnegative, pursue, senders, training, tree),
     ),
 }
 """What each selection depends on, beside the module that it is in."""
@@ -66,7 +67,7 @@ def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, 
         raise unknown("selection", select, SELECTIONS)
     if samples < 1:
         raise InputError(f"{mesh.name}: a spatial adjacency map needs at least one sample, not {samples}")
-    size = BYTES * len(mesh.positions) * samples
+    size = (BYTES * samples + (MIX_BYTES if select == "fit" else 0)) * len(mesh.positions)
     if size > MOST_BYTES:
         raise InputError(
             f"{mesh.name}: {samples} samples for each of {len(mesh.positions)} vertices take {size} bytes, "

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wgsss.bake.cache import Arrays
 from wgsss.bake.sam.blend import Blend
+from wgsss.bake.sam.mix import MIX_BYTES, Mix
 from wgsss.bake.sam.tree import Tree
 from wgsss.bake.samples import Samples
 
@@ -24,7 +25,8 @@ class Entries:
     """M_back at each of V vertices as a sum of n products (000 eq. 12): `weight` times what `sender` receives, L_d.
 
     A sender is a vertex, or one of `samples`; or, where there is a `tree`, a node: the mean over the vertices below it,
-    weighted by the areas of their fans; where there is a `blend`, one of its means over such means.
+    weighted by the areas of their fans; where there is a `blend`, one of its means over such means. Where there is a
+    `mix`, the sum is what a vertex gathers, and M_back a mixture of that.
     """
 
     sender: Array
@@ -36,14 +38,15 @@ class Entries:
     samples: Samples | None = None
     tree: Tree | None = None
     blend: Blend | None = None
+    mix: Mix | None = None
 
     @property
     def bytes_per_vertex(self) -> int:
-        return BYTES * self.sender.shape[1]
+        return BYTES * self.sender.shape[1] + (MIX_BYTES if self.mix else 0)
 
     def arrays(self) -> Arrays:
         """All of it by name, as the cache keeps it."""
-        parts = {"samples": self.samples, "tree": self.tree, "blend": self.blend}
+        parts = {"samples": self.samples, "tree": self.tree, "blend": self.blend, "mix": self.mix}
         found = {f"{part}.{name}": a for part, held in parts.items() if held for name, a in vars(held).items()}
         return {"sender": self.sender, "weight": self.weight, "senders": np.array(self.senders), **found}
 
@@ -56,7 +59,8 @@ class Entries:
             return kind(**held) if held else None
 
         samples, tree = part(Samples, "samples."), part(Tree, "tree.")
-        return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree, part(Blend, "blend."))
+        blend, mix = part(Blend, "blend."), part(Mix, "mix.")
+        return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree, blend, mix)
 
 
 def empty(vertices: int, n: int) -> tuple[Array, Array]:

@@ -1,7 +1,8 @@
 """`fit`: of all that reaches a vertex from behind, the few means by which its M_back is told best, whatever shines.
 
 What an entry may read is the irradiance at a vertex, or a blended mean over nodes of a tree. Each vertex's exact
-response to a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it.
+response to a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it. Where
+neighbours choose other ones, mixtures of what they gather come nearer still.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from wgsss.bake.sam.blend import WIDTHS, Blend, blend
 from wgsss.bake.sam.entries import Entries
+from wgsss.bake.sam.mix import mix
 from wgsss.bake.sam.pursuit import pursue
 from wgsss.bake.sam.quick import QuickFormFactors
 from wgsss.bake.sam.rows import Array, Senders, reaching, senders
@@ -46,6 +48,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     means = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
     own, read = _lights(s, means, compressed(training(mesh), s.area[:V]))
     sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
+    responses, total = np.zeros((V, own.shape[1]), np.float32), np.zeros((V, 3), np.float32)
 
     def fit(patches: Array) -> int:
         for vertices, reached in _batches(s, K, patches, own.shape[1]):
@@ -57,7 +60,12 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
             there = vertices >= 0
             found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
             sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
+            responses[vertices[there]] = response.sum(axis=1)[there]
+            total[vertices[there]] = k.sum(axis=3).transpose(0, 2, 1)[there]
         return len(patches)
+
+    def gathered(vertices: Array) -> Array:
+        return (weight[vertices].sum(axis=2)[:, None] @ read[sender[vertices]])[:, 0]
 
     levels = s.tree.levels
     level = min(PATCH, len(levels) - 2)
@@ -71,12 +79,14 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     ):
         for done in pool.map(fit, some):
             bar.update(done)
-    weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
-    sender[~weight.any(axis=2)] = -1
+        weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
+        sender[~weight.any(axis=2)] = -1
+        spacing = float(np.sqrt(s.area[:V].mean()))
+        mixed = mix(mesh.positions, mesh.normals, spacing, weight.sum(axis=1), gathered, responses, total)
     is_mean = sender >= V
     used, at = np.unique(sender[is_mean] - V, return_inverse=True)
     sender[is_mean] = V + at
-    return Entries(sender, weight, V, tree=s.tree, blend=means.only(used))
+    return Entries(sender, weight, V, tree=s.tree, blend=means.only(used), mix=mixed)
 
 
 def _lights(s: Senders, means: Blend, lights: Array) -> tuple[Array, Array]:
