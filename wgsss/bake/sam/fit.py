@@ -46,17 +46,17 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     K = QuickFormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
     means = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
-    own, read = _lights(s, means, compressed(training(mesh), s.area[:V]))
+    light = _lights(s, means, compressed(training(mesh), s.area[:V]))
     sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
-    responses, total = np.zeros((V, own.shape[1]), np.float32), np.zeros((V, 3), np.float32)
+    responses, total = np.zeros((V, light.shape[1]), np.float32), np.zeros((V, 3), np.float32)
 
     def fit(patches: Array) -> int:
-        for vertices, reached in _batches(s, K, patches, own.shape[1]):
+        for vertices, reached in _batches(s, K, patches, light.shape[1]):
             k = K(s, vertices, reached)
             candidates = _candidates(s, k.sum(axis=1), reached)
             B, _, P, C = k.shape
-            response = (k.reshape(B, 3 * P, C) @ own[reached]).reshape(B, 3, P, -1)
-            chosen, w = pursue(read[candidates], response, n)
+            response = (k.reshape(B, 3 * P, C) @ light[reached]).reshape(B, 3, P, -1)
+            chosen, w = pursue(light[candidates], response, n)
             there = vertices >= 0
             found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
             sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
@@ -65,7 +65,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
         return len(patches)
 
     def gathered(vertices: Array) -> Array:
-        return (weight[vertices].sum(axis=2)[:, None] @ read[sender[vertices]])[:, 0]
+        return (weight[vertices].sum(axis=2)[:, None] @ light[sender[vertices]])[:, 0]
 
     levels = s.tree.levels
     level = min(PATCH, len(levels) - 2)
@@ -84,28 +84,25 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
         spacing = float(np.sqrt(s.area[:V].mean()))
         mixed = mix(mesh.positions, mesh.normals, spacing, weight.sum(axis=1), gathered, responses, total)
     is_mean = sender >= V
-    used, at = np.unique(sender[is_mean] - V, return_inverse=True)
+    used, at = np.unique(sender[is_mean] - len(s.area), return_inverse=True)
     sender[is_mean] = V + at
     return Entries(sender, weight, V, tree=s.tree, blend=means.only(used), mix=mixed)
 
 
-def _lights(s: Senders, means: Blend, lights: Array) -> tuple[Array, Array]:
-    """Irradiances (V, T) of vertices and all nodes over them, as they are (V + N + 1, T), and as entries read them:
-    of vertices and of all blended means (V + U + 1, T). The last rows are 0, of no sender."""
-    V, T = lights.shape
-    own = np.zeros((len(s.area) + 1, T), np.float32)
-    own[:V] = lights
-    finest = s.tree.first[: s.tree.levels[1]]
-    sums = np.add.reduceat((lights * s.area[:V, None])[s.tree.order], finest)
-    for a, b in pairwise(V + s.tree.levels):
-        own[a:b] = sums / _positive(s.area[a:b, None])
-        sums = sums.reshape(-1, 4, T).sum(axis=1) if b - a > 1 else sums
-    read = np.zeros((V + len(means.node) + 1, T), np.float32)
-    read[:V] = lights
-    for first in range(0, T, 16):  # since what is gathered is nine times as large
+def _lights(s: Senders, means: Blend, lights: Array) -> Array:
+    """Irradiances (V + N + U + 1, T): (V, T) of vertices, nodes and blended means; the last row, of none, is 0."""
+    (V, T), end = lights.shape, len(s.area)
+    found = np.zeros((end + len(means.node) + 1, T), np.float32)
+    found[:V] = lights
+    levels, finest = V + s.tree.levels, s.tree.first[: s.tree.levels[1]]
+    for first in range(0, T, 16):  # what is summed or blended takes several times as much
         some = slice(first, first + 16)
-        read[V:-1, some] = means.of(own[V:-1, some])
-    return own, read
+        sums = np.add.reduceat((lights[:, some] * s.area[:V, None])[s.tree.order], finest)
+        for a, b in pairwise(levels):
+            found[a:b, some] = sums / _positive(s.area[a:b, None])
+            sums = sums.reshape(-1, 4, sums.shape[1]).sum(axis=1) if b - a > 1 else sums
+        found[end:-1, some] = means.of(found[V:end, some])
+    return found
 
 
 def _batches(s: Senders, K: QuickFormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
@@ -153,9 +150,10 @@ def _candidates(s: Senders, k: Array, reached: Array) -> Array:
     patch, sender = np.divmod(np.unique(np.concatenate(keys)), all_)
     start = np.searchsorted(patch, np.arange(len(k) + 1))
     found = _ranges(sender, start[:-1], np.diff(start))
-    nodes, V = all_ - len(s.tree.order), len(s.tree.order)
-    wider = [np.where(found >= V, found + width * nodes, -1) for width in range(1, len(WIDTHS))]
-    return np.concatenate([found, *wider], axis=1)
+    V, nodes = len(s.tree.order), all_ - len(s.tree.order)
+    is_mean = found >= V
+    wider = [np.where(is_mean, found + width * nodes, -1) for width in range(2, 1 + len(WIDTHS))]
+    return np.concatenate([np.where(is_mean, found + nodes, found), *wider], axis=1)
 
 
 def _positive(values: Array) -> Array:

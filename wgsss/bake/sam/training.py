@@ -19,6 +19,7 @@ SKY_WEIGHT, EVEN_WEIGHT = 1.0, 3.5
 """of a sky's error and of that under even light, which sets how much light there is in all, over a sun's"""
 COMPONENTS = 128
 """numbers that irradiances are compressed to"""
+_AT_ONCE = 1 << 16  # vertices
 _LIFT = 1e-4  # of the mesh's extent: how far above the surface rays start
 
 
@@ -44,8 +45,11 @@ def training(mesh: Mesh) -> Array:
 def compressed(lights: Array, area: Array) -> Array:
     """float32 (V, COMPONENTS): irradiances (T, V) over vertices of `area` (V,) in the directions, of all mixtures of
     lights, in which they differ most. Products between what is linear in them are nearly as before, and cost less."""
-    gram = (lights * area) @ lights.T
-    _, directions = np.linalg.eigh(gram.astype(np.float64))
+    gram = np.zeros((len(lights), len(lights)))
+    for first in range(0, len(area), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        gram += (lights[:, some] * area[some]) @ lights[:, some].T
+    _, directions = np.linalg.eigh(gram)
     basis = directions[:, ::-1][:, :COMPONENTS].astype(np.float32)
     return lights.T @ basis
 
