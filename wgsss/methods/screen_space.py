@@ -65,11 +65,14 @@ class ScreenSpace:
         return body.stage.shared(("separable", id(body.material), self.kernel, self.taps), make)
 
     def passes(self, frame: Frame) -> Diffused:
+        return Diffused(frame.once(self, lambda: self._M_front(frame)))
+
+    def _M_front(self, frame: Frame) -> Handle:
         irradiance = shared.irradiance_pixels(frame)
         M_front: Any = None
         for body in frame.stage.bodies:
             M_front = self.diffuse(frame, body, irradiance, M_front)
-        return Diffused(M_front)
+        return M_front
 
     def diffuse(self, frame: Frame, body: Body, irradiance: Handle, into: Handle | None) -> Handle:
         """M_front of one body, drawn onto `into`."""
