@@ -2,6 +2,10 @@
 
 By ambient occlusion with the normals turned round (Barré-Brisebois & Bouchard 2011), as the paper bakes it, but for how
 a distance counts, which follows from the material. White is thin.
+
+It is no length. What comes through at a vertex is what comes through a plate whose chords are as long as the vertex's
+in the mean, where that lies on a plate; 1.3 times as long on the built-in ear and 1.8 times on the Stanford bunny, by
+the median, with rank correlations of 0.84 and 0.86: short chords along the surface count for nothing.
 """
 
 from __future__ import annotations
