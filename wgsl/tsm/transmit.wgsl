@@ -72,6 +72,12 @@ fn share(blurred: texture_2d<f32>, linear_clamp: sampler, uv: vec2f, k: vec4f, w
     return k.rgb * weakened * textureSampleLevel(blurred, linear_clamp, uv, 0.0).rgb;
 }
 
+// Weights of the texels before, at and after a place, `f` into the one that it is in, by a quadratic B-spline.
+fn spline(f: f32) -> vec3f {
+    let g = 1.0 - f;
+    return vec3f(0.5 * g * g, 0.5 + f * g, 0.5 * f * f);
+}
+
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return rectangle_corner(i, params.rectangle);
@@ -89,17 +95,17 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let layer = select(0u, cube_face(-w_i), VIEWS == 6u);
     let clip = views[layer].world_to_clip * vec4f(x_o, 1.0);
     let size = vec2f(textureDimensions(entry));
-    let place = (vec2f(0.5, -0.5) * clip.xy / clip.w + 0.5) * size - 0.5;
-    let f = fract(place);
+    let place = (vec2f(0.5, -0.5) * clip.xy / clip.w + 0.5) * size;
+    let across = spline(fract(place.x));
+    let along = spline(fract(place.y));
     var M = vec3f(0.0);
     var counted = 0.0;
-    for (var i = 0u; i < 4u; i++) { // one by one: between atlas coordinates of two charts there is nothing
-        let step = vec2u(i & 1u, i >> 1u);
-        let at = clamp(vec2i(floor(place)) + vec2i(step), vec2i(0), vec2i(size) - 1);
+    for (var i = 0u; i < 9u; i++) { // one by one: between atlas coordinates of two charts there is nothing
+        let step = vec2u(i % 3u, i / 3u);
+        let at = clamp(vec2i(floor(place)) + vec2i(step) - 1, vec2i(0), vec2i(size) - 1);
         let x_i = textureLoad(entry, at, layer, 0);
         let n_i = textureLoad(entry_normal, at, layer, 0).xyz;
         let uv = textureLoad(entry_atlas, at, layer, 0).xy;
-        let nearness = select(1.0 - f, f, step == vec2u(1u));
         let way = way(x_i.xyz, n_i, x_o, n_o, w_i);
         var sum = share(blurred_0, linear_clamp, uv, params.gaussians[0], way);
         sum += share(blurred_1, linear_clamp, uv, params.gaussians[1], way);
@@ -107,7 +113,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         sum += share(blurred_3, linear_clamp, uv, params.gaussians[3], way);
         sum += share(blurred_4, linear_clamp, uv, params.gaussians[4], way);
         sum += share(blurred_5, linear_clamp, uv, params.gaussians[5], way);
-        let weight = nearness.x * nearness.y * x_i.w;
+        let weight = across[step.x] * along[step.y] * x_i.w;
         M += weight * sum;
         counted += weight; // a ray that passes by says nothing of x_o, which is beside it
     }
