@@ -33,6 +33,7 @@ SIZE = (128, 128)
 VERTICES = {"milk": 5000, "statue": 5000}  # the least that they can have; 2000 for the others
 KNOBS: dict[str, dict[str, Any]] = {
     "deon07": {"map_size": 256},
+    "jimenez08": {"map_size": 256},
     "jensen02": {"spacing": 6.0},
     "crowd jensen02": {"spacing": 20.0},  # heads are large beside what skin scatters over
     "sam": {"surface": "screen"},

@@ -173,12 +173,13 @@ def _irradiance_pixels(frame: Frame) -> Handle:
 
 
 def irradiance_texels(
-    frame: Frame, body: Body, map_size: int, *, least_cosine: float = -2.0, planes: Matrix | None = None
+    frame: Frame, body: Body, map_size: int, *, least_cosines: Any = None, planes: Matrix | None = None
 ) -> Handle:
     """L_d over a body's atlas, in `lighting.unit`, times the base colour's share that is applied before diffusion.
 
-    Texels are left empty, with an alpha of 0, where the angle between normal and viewer has a cosine below
-    `least_cosine`, and behind any of six `planes` (6, 4): where dot(plane, (x, 1)) < 0, x in world space, mm.
+    Texels are left empty, with an alpha of 0, where the angle between normal and viewer has a cosine below that of
+    `least_cosines`, a buffer with one for each render vertex or one for all; and behind any of six `planes` (6, 4):
+    where dot(plane, (x, 1)) < 0, x in world space, mm.
     """
     return frame.graph.draw(
         "frame/irradiance_texels",
@@ -186,11 +187,11 @@ def irradiance_texels(
         indices=body.indices,
         params={
             "unit": frame.lighting.unit,
-            "least_cosine": least_cosine,
             "eye": frame.view.eye,
             "planes": np.zeros((6, 4)) if planes is None else planes,
         },
         vertices=body.vertices,
+        least_cosines=np.array([-2.0], np.float32) if least_cosines is None else least_cosines,
         environment=body.environment.irradiance,
         **vars(body.maps),
         **frame.light_bindings(body),

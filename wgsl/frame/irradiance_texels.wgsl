@@ -9,7 +9,6 @@ import package::targets::{RGBA16Float};
 
 struct Params {
     unit: f32,                // W/m^2 that a value of 1 stands for
-    least_cosine: Number,     // of the angle between normal and viewer, at which texels are lit; -2 for all
     eye: vec4f,               // xyz, 1: where the camera is; xyz, 0: the direction towards it
     planes: array<vec4f, 6>,  // texels behind any of them are not lit
 }
@@ -28,6 +27,8 @@ struct Params {
 @group(0) @binding(11) var specular_map: texture_2d<f32>;
 @group(0) @binding(12) var linear_repeat: sampler;
 @group(0) @binding(13) var<uniform> params: Params;
+// Of the angle between normal and viewer, from which on texels are lit: at each vertex, or one for all.
+@group(0) @binding(14) var<storage, read> least_cosines: array<f32>;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -35,6 +36,7 @@ struct Varying {
     @location(1) normal: vec3f,
     @location(2) uv: vec2f,
     @location(3) sky: Number,
+    @location(4) least_cosine: Number,
 }
 
 struct Texel {
@@ -47,13 +49,14 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let x = surface.object_to_world * vec4f(vertex.position, 1.0);
     let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
     let clip = vec4f(vertex.atlas.x * 2.0 - 1.0, 1.0 - vertex.atlas.y * 2.0, 0.0, 1.0);
-    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky);
+    let least_cosine = least_cosines[min(i, arrayLength(&least_cosines) - 1u)];
+    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky, least_cosine);
 }
 
 // Whether a part of the texel about x faces the viewer enough, in front of all planes.
-fn is_wanted(x: Position, n: Direction) -> bool {
+fn is_wanted(x: Position, n: Direction, least_cosine: Number) -> bool {
     let cosine = dot(n, direction_to_eye(params.eye, x));
-    var wanted = cosine + fwidth(cosine) >= params.least_cosine;
+    var wanted = cosine + fwidth(cosine) >= least_cosine;
     for (var i = 0u; i < 6u; i++) {
         wanted = wanted && dot(params.planes[i], vec4f(x, 1.0)) >= 0.0;
     }
@@ -66,7 +69,7 @@ fn fs(in: Varying) -> Texel {
     let dx = dpdx(x); // the texel's sides: what it holds is the mean over them, or a shadow's edge would move by half a texel
     let dy = dpdy(x);
     let n_s = normalize(in.normal);
-    let wanted = is_wanted(x, n_s);
+    let wanted = is_wanted(x, n_s, in.least_cosine);
     let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
     let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
     let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;

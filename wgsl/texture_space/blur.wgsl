@@ -7,8 +7,8 @@
 
 import package::units::{Area};
 import package::charts::{INSIDE, Seam, across, id_at, settled};
+import package::screen::{screen_corner};
 import package::targets::{RGBA16Float};
-import package::tiles::{tile_corner};
 
 struct Params {
     axis: vec3f,      // the first direction is across it
@@ -16,7 +16,7 @@ struct Params {
     variance: Area,   // of the Gaussian
     reached: Area,    // of the last one, which the source has been blurred by; 0 for the irradiance
     finer: f32,       // texels of the source per texel of what is drawn
-    tile: f32,        // side of a tile, of the map
+    depth: f32,       // that it is drawn at: nearer than the last one on the same mask
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -26,7 +26,6 @@ struct Params {
 @group(0) @binding(4) var gradient_v: texture_2d<f32>;
 @group(0) @binding(5) var ids: texture_2d<u32>;
 @group(0) @binding(6) var<storage, read> seams: array<Seam>;
-@group(0) @binding(7) var tiles: texture_2d<u32>;
 
 struct Texel {
     @location(0) blurred: RGBA16Float,
@@ -45,7 +44,7 @@ const HALVING: f32 = 0.25;     // reading a larger map between its texels
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return tile_corner(i, tiles, params.tile);
+    return vec4f(screen_corner(i).xy, params.depth, 1.0);
 }
 
 // Whether a place is in the gutter of a chart, given by its id; what charts that are close have between them is the
@@ -122,9 +121,10 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     // Samples of a Gaussian much narrower than their spacing have less variance than it: three that have as much.
     let exponent = select(-0.5 / spread, log(0.5 * spread / (1.0 - spread)), spread < 0.25);
     var total = textureSampleLevel(source, linear_clamp, home, 0.0);
-    let empty = id == 0u || total.a == 0.0; // outside the charts, or not lit
-    var taps = 0.0; // where nothing is drawn, or the Gaussian is narrower than a texel
-    if !empty && variance > 0.0 {
+    // None where the Gaussian is narrower than a texel; nor where the mask hides what is drawn: on CPUs that runs on in the
+    // lanes of its neighbours.
+    var taps = 0.0;
+    if id != 0u && total.a > 0.0 && variance > 0.0 {
         taps = clamp(ceil(REACH * sqrt(variance) / spacing), 1.0, MAX_TAPS);
     }
     // Apart, since on CPUs a branch costs all lanes what one of them takes: taps that stay in the chart, taps that may not.
@@ -140,8 +140,5 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
         let step = texels_per_mm * (spacing * k / size);
         total += exp(exponent * k * k) * textureSampleLevel(source, linear_clamp, walk(home, step), 0.0);
     }
-    if empty {
-        discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
-    }
-    return Texel(vec4f(total.rgb / max(total.a, 1e-4), 1.0)); // alpha: 1 where the source has a value
+    return Texel(vec4f(total.rgb / max(total.a, 1e-4), f32(total.a > 0.0))); // alpha: 1 where the source has a value
 }

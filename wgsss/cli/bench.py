@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.cli import arguments
+from wgsss.errors import InputError
 
 _SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
 _FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
@@ -23,6 +24,9 @@ _HEAD = [
     "FLIP",
     "bias",
 ]
+_TABLE = """speedup: instead of a chart, how much faster jimenez08 is than the same diffusion of all of the surface, by
+number of heads and distance; of the scene crowd, written to speedup.json"""
+_SIZE = "pixels (default: 256x256; of the table 480x300)"
 _SCHEDULER = "of a Dask cluster to run on (default: run here)"
 
 
@@ -32,12 +36,15 @@ def declare(commands: Any) -> None:
     add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
     add("--methods", metavar="NAME,NAME,…", type=arguments.names, help="default: all (see 'wgsss methods')")
     add("--reference", metavar="NAME", default="integral", help="what errors are measured against (default: integral)")
-    add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
+    add("--table", metavar="NAME", choices=TABLES, help=_TABLE)
+    add("--size", metavar="WxH", type=arguments.size, help=_SIZE)
     add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)
     add("-o", "--output", metavar="DIR", type=Path, default=Path("bench"), help=_FOLDER)
 
 
 def run(args: Any) -> None:
+    if args.table:
+        return TABLES[args.table](args)
     from wgsss.study.bench import bench, read
     from wgsss.study.chart import draw
 
@@ -49,7 +56,7 @@ def run(args: Any) -> None:
             scenes,
             args.methods,
             args.output,
-            args.size,
+            args.size or (256, 256),
             reference=args.reference,
             scheduler=args.scheduler,
             tell=_tell,
@@ -58,6 +65,31 @@ def run(args: Any) -> None:
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
     arguments.tell(args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *files]))
+
+
+def _speedup(args: Any) -> None:
+    from wgsss.study.speedup import DEFAULT_SIZE, FILE, speedup
+
+    if args.scenes != ["crowd"]:
+        raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
+    if args.methods or args.scheduler:
+        raise InputError("the table speedup is of two methods, measured here: no --methods and no --scheduler")
+    table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)
+    about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"
+    lines = [arguments.table(table.rows()), "", f"{about}, maps of {table.map_size}, {table.adapter}"]
+    file = str(args.output / FILE)
+    arguments.tell(args, {**table.json(), "files": [file]}, "\n".join([*lines, "", file]))
+
+
+TABLES = {"speedup": _speedup}
+
+
+def _tell_cell(cell: Any) -> None:
+    if not sys.stderr.isatty():
+        times = f"{cell.full_ms:.0f} ms to {cell.seen_ms:.0f} ms"
+        print(
+            f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times", file=sys.stderr, flush=True
+        )
 
 
 def _tell(run: dict[str, Any]) -> None:

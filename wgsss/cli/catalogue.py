@@ -30,7 +30,7 @@ def methods(args: Any) -> None:
         for entry in found:
             rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
             for knob in entry["knobs"]:
-                rows.append(["", f"--set {knob['name']}={knob['default']}  {knob['help']}, {_values(knob)}"])
+                rows.append(["", f"--set {knob['name']}={_word(knob['default'])}  {knob['help']}, {_values(knob)}"])
     pairs = {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
     lines = [f"--{part} one of {', '.join(names)}" for part, names in pairs.items()]
     text = "\n".join([arguments.table(rows), "", "or a pair of", *(f"  {line}" for line in lines)])
@@ -41,8 +41,15 @@ def _values(knob: dict[str, Any]) -> str:
     """What a knob may be set to, in words."""
     if "choices" in knob:
         return "one of " + ", ".join(knob["choices"])
+    if isinstance(knob["default"], bool):
+        return "on or off"
     low, high = knob["range"]
     return f"{low:g} to {high:.10g}" + (f" {knob['unit']}" if knob["unit"] else "")
+
+
+def _word(value: Any) -> str:
+    """A knob's value as `--set` takes it."""
+    return ("on" if value else "off") if isinstance(value, bool) else str(value)
 
 
 def _described(kinds: Any) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from dataclasses import fields
 from typing import Any
 
 from wgsss.errors import InputError, unknown
+from wgsss.methods.jimenez08 import SeenTextureSpace
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.local_thickness import LocalThickness
 from wgsss.methods.method import Diffused, Method
@@ -31,6 +32,7 @@ TRANSLUCENCIES: dict[str, type[Translucency]] = {
 METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
     "deon07": pair(TextureSpace, TranslucentShadowMaps),
+    "jimenez08": SeenTextureSpace,
     "jimenez15": pair(ScreenSpace, Transmittance),
     "barre11": pair(Lambert, LocalThickness),
     "jensen02": PointCloud,
@@ -97,6 +99,8 @@ def _parsed(where: str, knob: Any, value: Any) -> Any:
             raise InputError(f"{where} must be one of {', '.join(choices)}, not '{value}'")
         return value
     kind = type(knob.default)
+    if kind is bool:
+        return _switched(where, value)
     try:
         parsed = kind(float(value)) if kind is int and float(value).is_integer() else kind(value)
     except (TypeError, ValueError):
@@ -105,6 +109,17 @@ def _parsed(where: str, knob: Any, value: Any) -> Any:
     if not low <= parsed <= high:
         raise InputError(f"{where} must lie between {low:g} and {high:g}, not {parsed:g}")
     return parsed
+
+
+_SWITCHES = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
+
+
+def _switched(where: str, value: Any) -> bool:
+    """Whether a switch is on."""
+    found = _SWITCHES.get(str(value).lower())
+    if found is None:
+        raise InputError(f"{where} must be on or off, not '{value}'")
+    return found
 
 
 __all__ = ["METHODS", "SURFACES", "TRANSLUCENCIES", "Diffused", "Method", "kind_of", "make_method", "name_of"]

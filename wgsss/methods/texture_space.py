@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss import wgsl
 from wgsss.bake.charts import Charts
 from wgsss.bake.charts import charts as make_charts
 from wgsss.frame import Frame
@@ -24,7 +23,6 @@ from wgsss.stage import Body, Stage
 
 SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
 MOST_HALVINGS = 2  # smaller maps would lose whole charts
-GUTTER = 3  # texels around a chart, as in wgsl/bake/gutter.wgsl
 _SLOTS = 6  # of wgsl/texture_space/gather.wgsl
 # The directions of a separable blur are undefined where the surface faces the axis that they turn about. With another
 # axis for each Gaussian, no place is undefined for all.
@@ -114,61 +112,40 @@ class TextureSpace:
 
         return frame.once(("blurs", self, body.index), make)
 
-    def blur(self, frame: Frame, body: Body, irradiance: Handle, *, sparse: bool = False) -> list[Handle]:
-        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first.
+    def blur(self, frame: Frame, body: Body, irradiance: Handle) -> list[Handle]:
+        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first. Texels without a value stay
+        so, and do not count where others have one."""
+        graph, sizes = frame.graph, self.sizes(body)
 
-        Texels without a value stay so, and do not count where others have one. If they are many, the map is `sparse`,
-        and only tiles with a value are drawn.
-        """
-        graph, full, sizes = frame.graph, atlas(body, self.map_size), self.sizes(body)
-        tile, covered = self._tiles(frame, irradiance, min(sizes)) if sparse else _one_tile(frame.stage)
-        blurred = graph.draw(
-            "texture_space/dilate",
-            size=(self.map_size, self.map_size),
-            params={"tile": tile},
-            source=irradiance,
-            ids=full.ids,
-            seams=full.seams,
-            **covered,
-        )
-        found, reached = [], 0.0
+        def over(module: str, size: int, **rest: Any) -> Any:
+            charts = atlas(body, size)
+            return graph.draw(module, size=(size, size), ids=charts.ids, seams=charts.seams, **rest)
+
+        drawn = over("texture_space/dilate", self.map_size, depth_buffer="new", source=irradiance)
+        blurred, masks = drawn.dilated, {self.map_size: drawn.depth}
+        for size in {*sizes} - {self.map_size}:
+            masks[size] = over("texture_space/mask", size, label=str(size), depth_buffer="new", source=irradiance).depth
+        reached = 0.0
+        found: list[Handle] = []
         for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, sizes, strict=True)):
             charts = atlas(body, map_size)
-            widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size, "tile": tile}
+            widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size}
             for direction in (0, 1):
-                blurred = graph.draw(
+                nearer = 1.0 - (1 + 2 * k + direction) / (1 + 2 * len(sizes))
+                drawn = over(
                     "texture_space/blur",
-                    size=(map_size, map_size),
+                    map_size,
+                    depth_buffer=masks[map_size],
                     label=f"{variance:.3g} mm2 {'uv'[direction]}",
-                    params={"axis": _AXES[k % 3], "direction": direction, **widths},
-                    **covered,
+                    params={"axis": _AXES[k % 3], "direction": direction, "depth": nearer, **widths},
                     source=blurred,
                     gradient_u=charts.gradient_u,
                     gradient_v=charts.gradient_v,
-                    ids=charts.ids,
-                    seams=charts.seams,
                 )
+                blurred, masks[map_size] = drawn.blurred, drawn.depth
             reached = float(variance)
             found.append(blurred)
         return found
-
-    def _tiles(self, frame: Frame, irradiance: Handle, smallest: int) -> tuple[float, dict[str, Any]]:
-        """The side of a tile, of the map, and what draws those that have a value on maps down to the `smallest`."""
-        side = wgsl.load("tiles").constants["TILE"]
-        across = -(-self.map_size // side)
-        tiles = frame.graph.draw(
-            "texture_space/tiles",
-            size=(across, across),
-            constants={"REACH": GUTTER * -(-self.map_size // smallest)},
-            source=irradiance,
-        )
-        return side / self.map_size, {"count": 6 * across * across, "tiles": tiles}
-
-
-def _one_tile(stage: Stage) -> tuple[float, dict[str, Any]]:
-    """As `_tiles`, for all of the map."""
-    tiles = stage.shared("one tile", lambda: stage.gpu.texture(np.ones((1, 1)), "r32uint"))
-    return 1.0, {"count": 6, "tiles": tiles}
 
 
 def atlas(body: Body, size: int) -> Charts:

@@ -1,0 +1,51 @@
+"""How far a surface turns within a distance: what can be seen may get light from what faces away by that angle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.cache import Arrays, cached
+
+Array = npt.NDArray[Any]
+
+_CELLS = 4.0  # per distance: nearer points whose normals are alike are taken together
+
+
+def turns(positions: Array, normals: Array, distance: float) -> Array:
+    """float32 (N,): the largest angle, rad, between the normal at each point and those at points within `distance`.
+
+    Args:
+        positions: (N, 3), mm
+        normals: (N, 3), of length 1
+        distance: mm, as the crow flies; it is exact to a quarter
+    """
+
+    def make() -> Arrays:
+        return {"turns": _turns(positions.astype(np.float64), normals.astype(np.float64), distance)}
+
+    label = f"turns of {len(positions)} normals within {distance:.3g} mm"
+    return cached("turns", [positions, normals, distance], make, code=[_turns], label=label)["turns"]
+
+
+def _turns(positions: Array, normals: Array, distance: float) -> Array:
+    from scipy.spatial import cKDTree
+
+    cell = np.floor((positions - positions.min(axis=0)) / (distance / _CELLS)).astype(np.int64)
+    alike = np.round(normals * _CELLS / 2).astype(np.int64)
+    _, group = np.unique(np.concatenate([cell, alike], axis=1), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    count = np.bincount(group)
+    place, normal = (
+        np.stack([np.bincount(group, column) for column in values.T], axis=1) / count[:, None]
+        for values in (positions, normals)
+    )
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    near = cKDTree(positions).query_ball_tree(cKDTree(place), distance)
+    of = np.repeat(np.arange(len(near)), [len(found) for found in near])
+    to = np.concatenate([np.asarray(found, np.int64) for found in near])
+    least = np.ones(len(positions))
+    np.minimum.at(least, of, np.einsum("nd,nd->n", normals[of], normal[to]))
+    return np.arccos(np.clip(least, -1.0, 1.0)).astype(np.float32)
