@@ -12,7 +12,7 @@ far as the normals at x_i and x_o oppose each other, and so does this: else ligh
 half. Where x_i and x_o are near each other on the surface, M_front has that light already, and M_back is faded out.
 
 Away from the edges of a slab the formula is as far from the integral over the surface as the Gaussians are from the
-profile. For marble it is within 0.1 % at 2 mm; at 8 mm, where 9, 5 and 2 % of what diffuses comes through, off by -4, +7
+profile. For marble it is within 0.1 % at 2 mm; at 8 mm, where 9, 5 and 2 % of what diffuses comes through, by -4, +7
 and +14 % in red, green and blue; at 16 mm by -78, -60 and -23 %, since a dipole's tail outlasts any Gaussian.
 
 What has entered from one light must not be found along another: where there are several, each has blurred maps of its
