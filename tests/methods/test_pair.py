@@ -76,16 +76,12 @@ def test_presets_are_found_by_the_pair_that_they_are() -> None:
         ("texture+paper", "unknown translucency 'paper'"),
         ("sam+texture", "unknown surface 'sam'"),
         ("+sam", "unknown surface ''"),
+        ("screen+tsm", "translucency tsm goes with surface texture, not with screen"),
     ],
 )
 def test_what_is_no_pair_is_refused(name: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         make_method(name)
-
-
-def test_a_translucency_that_reads_what_is_not_made_is_refused() -> None:
-    with pytest.raises(InputError, match="Reader reads what TextureSpace makes"):
-        pair(Lambert, Reader)
 
 
 def test_what_both_parts_read_is_declared_once(gpu: Gpu) -> None:

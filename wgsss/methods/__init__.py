@@ -53,7 +53,15 @@ def kind_of(name: str) -> type[Method]:
             raise unknown("surface", surface, SURFACES)
         if translucency not in ("none", *TRANSLUCENCIES):
             raise unknown("translucency", translucency, ("none", *TRANSLUCENCIES))
-        return SURFACES[surface] if translucency == "none" else pair(SURFACES[surface], TRANSLUCENCIES[translucency])
+        if translucency == "none":
+            return SURFACES[surface]
+        part = TRANSLUCENCIES[translucency]
+        fitting = [name for name, kind in SURFACES.items() if issubclass(kind, part.beside)]
+        if surface not in fitting:
+            raise InputError(
+                f"translucency {translucency} goes with surface {' or '.join(fitting)}, not with {surface}"
+            )
+        return pair(SURFACES[surface], part)
     kinds = {**METHODS, **REFERENCES}
     if name not in kinds:
         raise unknown("method", name, kinds)

@@ -6,9 +6,9 @@ from dataclasses import field, fields, make_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Protocol
 
-from wgsss.errors import InputError
 from wgsss.frame import Frame
 from wgsss.graph import Handle
+from wgsss.methods.lambert import Lambert
 from wgsss.methods.method import Diffused, Method
 from wgsss.stage import Stage
 
@@ -54,19 +54,12 @@ class Pair:
 
 @cache
 def pair(surface: type[Method], translucency: type[Translucency]) -> type[Method]:
-    """The method of these two parts.
-
-    Raises InputError where the translucency reads what the surface does not make.
-    """
-    if not issubclass(surface, translucency.beside):
-        raise InputError(
-            f"{translucency.__name__} reads what {translucency.beside.__name__} makes, so that it cannot go with "
-            f"{surface.__name__}"
-        )
+    """The method of these two parts."""
+    parts: tuple[Any, Any] = surface, translucency
     knobs = [
         (knob.name, knob.type, field(default=knob.default, metadata=knob.metadata))
-        for part in (surface, translucency)
-        for knob in fields(part)  # type: ignore[arg-type]
+        for part in parts
+        for knob in fields(part)
     ]
     made: type[Method] = make_dataclass(
         f"{surface.__name__}And{translucency.__name__}",
@@ -74,8 +67,8 @@ def pair(surface: type[Method], translucency: type[Translucency]) -> type[Method
         bases=(Pair,),
         frozen=True,
         namespace={
-            "parts": (surface, translucency),
-            "source": "; ".join(dict.fromkeys([surface.source, translucency.source])),
+            "parts": parts,
+            "source": "; ".join(dict.fromkeys(part.source for part in parts if part is not Lambert)),
             "sweep": (*surface.sweep, *translucency.sweep),
         },
     )
