@@ -20,6 +20,9 @@ from wgsss.stage import Body, Stage
 
 Matrix = npt.NDArray[Any]
 
+BLOOM_SIGMA = 1.0 / 64.0
+"""The standard deviation of bloom, of the image's height."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -259,6 +262,27 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
             **frame.seen("where_seen", "normal", "depth"),
         )
     return radiance
+
+
+def bloom(graph: Graph, radiance: Handle, strength: float) -> Handle:
+    """The radiance, a share `strength` of it spread over the pixels around by a Gaussian. With 0 it is what it was."""
+    if strength == 0.0:
+        return radiance
+    sigma = BLOOM_SIGMA * radiance.size[1]
+    weights = np.exp(-0.5 * (np.arange(math.ceil(3.0 * sigma) + 1) / sigma) ** 2)
+    weights /= weights[0] + 2.0 * weights[1:].sum()
+    spread = radiance
+    for direction in (0, 1):
+        spread = graph.draw(
+            "frame/bloom",
+            label="xy"[direction],
+            constants={"DIRECTION": direction},
+            params={"strength": strength},
+            radiance=radiance,
+            spread=spread,
+            weights=weights.astype(np.float32),
+        )
+    return spread
 
 
 def tone_map(graph: Graph, radiance: Handle, exposure: float, curve: str) -> Handle:

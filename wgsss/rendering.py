@@ -70,7 +70,8 @@ def draw(frame: shared.Frame, method: Method) -> Drawn:
         "depth": frame.gbuffer.depth,
         "normal": frame.gbuffer.normal,
     }
-    return Drawn(radiance, shared.tone_map(frame.graph, radiance, scene.exposure, scene.tone_map), layers)
+    shown = shared.bloom(frame.graph, radiance, scene.bloom)
+    return Drawn(radiance, shared.tone_map(frame.graph, shown, scene.exposure, scene.tone_map), layers)
 
 
 class Renderer:

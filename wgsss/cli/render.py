@@ -31,6 +31,7 @@ def declare(commands: Any) -> None:
     add("--time", metavar="S", type=arguments.number, default=0.0, help="of the first frame, seconds (default: 0)")
     add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
     add("--tone-map", metavar="NAME", help="none, reinhard or aces, instead of the scene's own")
+    add("--bloom", metavar="SHARE", type=arguments.number, help="of the light that spreads, in pictures")
     add("-o", "--output", metavar="FILE", type=Path, help=_OUTPUT)
     add("--graph", action="store_true", help=_GRAPH)
     add("--graph-out", metavar="FILE.dot", type=Path, help="write that frame's graph for Graphviz")
@@ -48,7 +49,7 @@ def run(args: Any) -> None:
     method = arguments.make_method(args)
     name = name_of(method)
     scene = arguments.load_scene(args)
-    own = {"exposure": args.exposure, "tone_map": args.tone_map}
+    own = {"exposure": args.exposure, "tone_map": args.tone_map, "bloom": args.bloom}
     scene = replace(scene, **{key: value for key, value in own.items() if value is not None})
 
     start = time.perf_counter()

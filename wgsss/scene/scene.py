@@ -93,6 +93,8 @@ class Scene:
     """stops: radiance is multiplied by 2^exposure before tone mapping"""
     tone_map: str = "aces"
     """one of none, reinhard, aces"""
+    bloom: float = 0.0
+    """the share of the light that spreads over the pixels around, on a display: radiance stays as it is"""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "objects", tuple(self.objects))
@@ -100,6 +102,7 @@ class Scene:
         if not self.objects:
             raise InputError(f"{self.name}: the scene has no objects")
         checks.number(self, "exposure", -32, 32)
+        checks.number(self, "bloom", 0, 1)
         if self.tone_map not in TONE_MAPS:
             raise unknown("tone_map", str(self.tone_map), TONE_MAPS)
 

@@ -1,9 +1,9 @@
 """Scene files: the dataclasses of this package as TOML.
 
-The top level holds `name`, `exposure` and `tone_map`. `[camera]`, each `[[light]]` and each `[[object]]` hold the
-fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and `elevation`
-of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm` and the `animation` of a glTF) or a `shape`
-(with the arguments of that function in `shapes`), and a `material`: a name, a material file, or a table
+The top level holds `name`, `exposure`, `tone_map` and `bloom`. `[camera]`, each `[[light]]` and each `[[object]]` hold
+the fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and
+`elevation` of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm` and the `animation` of a glTF)
+or a `shape` (with the arguments of that function in `shapes`), and a `material`: a name, a material file, or a table
 `[object.material]`. Such a table or file holds the fields of Material, may start from a `preset`, and names images as
 `base_color_map`, `normal_map` and `specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake
 case. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
