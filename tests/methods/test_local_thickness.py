@@ -68,7 +68,7 @@ def unpacked(thickness: Any, *, coloured: bool = True) -> Any:
 def test_the_printed_formula(gpu: Gpu, even: None, stored: str, knobs: dict[str, Any]) -> None:
     """Of parallel light, on a ball, whose normals an orthographic camera sees."""
     found = seen(gpu, lit(BELOW, mesh=BALL), stored=stored, **knobs)
-    k = {"distortion": 0.0, "power": 4.0, "scale": 0.95, "ambient": 0.05, **knobs}
+    k = {"distortion": 0.0, "power": 2.0, "scale": 0.8, "ambient": 0.05, **knobs}
     towards = -np.array(BELOW.direction) / np.linalg.norm(BELOW.direction)
     bent = towards + k["distortion"] * found["normal"].astype(np.float64)
     dot = np.clip(-bent[..., 1], 0.0, 1.0) ** k["power"]  # seen from above
@@ -92,9 +92,9 @@ def test_light_falls_off_and_the_view_has_perspective(gpu: Gpu, even: None, stor
     to_light, to_eye = lamp - x, eye - x
     d2 = np.square(to_light).sum(axis=2, keepdims=True)
     to_eye /= np.linalg.norm(to_eye, axis=2, keepdims=True)
-    dot = np.maximum(-(to_light / np.sqrt(d2) * to_eye).sum(axis=2), 0.0) ** 4
+    dot = np.maximum(-(to_light / np.sqrt(d2) * to_eye).sum(axis=2), 0.0) ** 2
     thickness = unpacked(THICKNESS) if stored == "g-buffer" else THICKNESS
-    light = np.array([0.1, 0.2, 0.3]) / (d2 * 1e-6) * (dot * 0.95 + 0.05)[..., None]
+    light = np.array([0.1, 0.2, 0.3]) / (d2 * 1e-6) * (dot * 0.8 + 0.05)[..., None]
     np.testing.assert_allclose(found["M_back"], ALBEDO * light * thickness, rtol=4e-3)
 
 
@@ -102,7 +102,9 @@ def test_a_product_beyond_1_saturates(gpu: Gpu, even: None) -> None:
     """L' is longer than L where the normal faces away, as normals of a file may: 1.9 to the power of 4 would be 13."""
     flat = plane()
     bent = replace(flat, corner_normals=np.broadcast_to(np.array([0, -1, 0], np.float32), (len(flat.faces), 3, 3)))
-    found = seen(gpu, lit(DirectionalLight((0, 1, 0), (1, 1, 1)), mesh=bent), distortion=0.9)
+    found = seen(
+        gpu, lit(DirectionalLight((0, 1, 0), (1, 1, 1)), mesh=bent), distortion=0.9, power=4, scale=1.0, ambient=0.0
+    )
     np.testing.assert_allclose(found["M_back"][16, 16], ALBEDO * THICKNESS, rtol=1e-3)
 
 
@@ -123,19 +125,21 @@ def test_of_a_sky_the_other_half_counts(gpu: Gpu, even: None, tmp_path: Any) -> 
     light = EnvironmentLight(file=write_environment(tmp_path / "below.exr", pixels))
     for stored in MODES:
         found = seen(gpu, lit(light, mesh=BALL), stored=stored)
-        assert found["M_back"][16, 16, 0] == pytest.approx(np.pi * ALBEDO[0] * THICKNESS[0], rel=0.03)
+        assert found["M_back"][16, 16, 0] == pytest.approx(0.85 * np.pi * ALBEDO[0] * THICKNESS[0], rel=0.03)
         assert found["irradiance"][16, 16].max() < 0.01
 
 
 @pytest.mark.parametrize("name", ["skin1", "marble"])
 def test_a_plate_under_an_even_sky_is_the_integrals(gpu: Gpu, name: str) -> None:
-    """By default it transmits total eps(h) L_d, eps being the share of the profile beyond its thickness."""
+    """It transmits total eps(h) L_d, eps being the share of the profile beyond its thickness."""
     material = replace(MATERIALS[name], specular=0.0)
     plate = slab((400.0, 3.0, 400.0), vertices=2500)
     scene = lit(EnvironmentLight((1, 1, 1)), mesh=plate, material=material)
     profile = material.profile
     wanted = np.pi * profile.total * profile.beyond(3.0)
-    np.testing.assert_allclose(seen(gpu, scene, 9)["M_back"][4, 4], wanted, rtol=0.02, atol=5e-3)
+    np.testing.assert_allclose(
+        seen(gpu, scene, 9, scale=1.0, ambient=0.0)["M_back"][4, 4], wanted, rtol=0.02, atol=5e-3
+    )
 
 
 def test_lights_add_up_and_nothing_casts_shadows(gpu: Gpu, even: None) -> None:
@@ -167,7 +171,8 @@ def test_the_base_colour_multiplies(gpu: Gpu, even: None) -> None:
 def test_grey_lets_through_as_much_white_light(gpu: Gpu, even: None, stored: str) -> None:
     scene = lit(DirectionalLight((0, 1, 0), (2, 2, 2)), mesh=BALL)
     coloured, grey = (
-        seen(gpu, scene, 9, thickness=kind, stored=stored)["M_back"][4, 4] for kind in ("coloured", "grey")
+        seen(gpu, scene, 9, scale=1.0, ambient=0.0, thickness=kind, stored=stored)["M_back"][4, 4]
+        for kind in ("coloured", "grey")
     )
     assert grey.sum() == pytest.approx(coloured.sum(), rel=0.02)
     np.testing.assert_allclose(grey / ALBEDO, grey[0] / ALBEDO[0], rtol=1e-4)
