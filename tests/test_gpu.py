@@ -9,7 +9,7 @@ import pytest
 
 from wgsss import gpu as gpu_module
 from wgsss.errors import InputError
-from wgsss.gpu import FORMATS, LIMITS, Gpu
+from wgsss.gpu import FORMATS, LIMITS, Gpu, TextureKey
 from wgsss.graph import Graph
 from wgsss.wgsl import WgslError
 
@@ -69,3 +69,15 @@ def test_hardware_is_timed_by_its_own_timestamps(gpu, modules, monkeypatch):
     assert graph.clock == "gpu timestamps" and list(graph.times) == ["count"]
     assert 0 <= graph.times["count"] < 1e4 and timed.ns_per_tick > 0
     assert graph.read(numbers).tolist() == list(range(8))
+
+
+def test_what_is_in_the_pool_is_used_again_until_it_is_let_go():
+    gpu = Gpu()
+    key = TextureKey((3, 5, 1), "rgba8unorm", 4)
+    first = gpu.acquire(key)
+    gpu.view(first)
+    gpu.release(key, first)
+    assert gpu.acquire(key) is first
+    gpu.release(key, first)
+    gpu.trim()
+    assert gpu.acquire(key) is not first and id(first) not in gpu._views

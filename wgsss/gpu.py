@@ -276,6 +276,13 @@ class Gpu:
         """Give a texture or buffer back to the pool."""
         self._free[key].append(resource)
 
+    def trim(self) -> None:
+        """Let go of what is in the pool, where sizes are not those of before."""
+        for resources in self._free.values():
+            for resource in resources:
+                self._views.pop(id(resource), None)
+        self._free.clear()
+
 
 @lru_cache(maxsize=1)
 def default_gpu() -> Gpu:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from wgsss import wgsl
 
 
 class Shaders:
     """The WGSL modules that are in use."""
 
-    def __init__(self) -> None:
+    def __init__(self, root: Path = wgsl.ROOT) -> None:
+        self._root = root
         self._seen = self._times()
         self._good = dict(wgsl.loaded)
 
-    @staticmethod
-    def _times() -> dict[str, int]:
-        return {str(path): path.stat().st_mtime_ns for path in wgsl.ROOT.rglob("*.wgsl")}
+    def _times(self) -> dict[str, int]:
+        return {str(path): path.stat().st_mtime_ns for path in self._root.rglob("*.wgsl")}
 
     def changed(self) -> bool:
         """Whether a file has changed since it was asked last; if so, all are read anew."""

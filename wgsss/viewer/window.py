@@ -34,6 +34,8 @@ GRIP = 8
 """logical pixels to either side of the divider where it can be dragged"""
 POLL_S = 0.2
 """between looks at how far a reference is"""
+WATCH_S = 0.5
+"""between looks at the shaders' files"""
 STEP_S = 1 / 25
 """of time, by the key"""
 KEY_STEP = 0.03
@@ -100,9 +102,17 @@ class Window:
 
     def run(self) -> None:
         """Until the window is closed."""
+        self._watch()
         loop().run()
         self.truth.close()
         memory.remember({"size": self._size, "open": sorted(self.open_panels)})
+
+    def _watch(self) -> None:
+        """Look after the shaders, again and again."""
+        if self.shaders.changed():
+            self._drawn = None
+            self.refresh()
+        loop().call_later(WATCH_S, self._watch)
 
     def refresh(self) -> None:
         """Draw again soon."""
@@ -134,8 +144,6 @@ class Window:
         if self.state.playing:
             self.state.time_s += now - self._clock
         self._clock = now
-        if self.shaders.changed():
-            self._drawn = None
         self._size = self.canvas.get_logical_size()
         self._paint()
         self.ui.render()
@@ -158,6 +166,8 @@ class Window:
         last = None if self._drawn is None else self._drawn[0]
         if view != last:
             self._changed_s = now
+        if last is not None and view[-1] != last[-1]:
+            self.gpu.trim()  # or pictures of every size that the window had would be kept
         moving = state.playing or (last is not None and now - self._changed_s < STILL_S)
         scale = self.pace.scale if moving else 1.0
         known = None if moving else self._known()
