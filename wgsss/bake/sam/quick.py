@@ -16,11 +16,11 @@ from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
-BEYOND = 1e-3
+BEYOND = 5e-4
 """share of the light of a plane that comes from farther away than what is looked at"""
 FAINT = 3e-3
 """share of what leaves a plane in all, below which a node is not looked into"""
-NEAREST = 2.5
+NEAREST = 3.0
 """roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
 _SHIFT = 16  # bits of a squared distance that the table of R_d leaves out: it has 128 entries each time that it doubles
 _LEAST = 1e-3  # its first distance, of the last

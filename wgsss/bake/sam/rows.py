@@ -23,6 +23,8 @@ Array = npt.NDArray[Any]
 
 OPENING = 0.35
 """radius of a node over its distance, at most; the published criterion of the same kind (004 eq. 42) takes sizes"""
+WITHIN = 0.5
+"""of a node's mean squared extent, which counts as distance: R_d bends, so that all of it would be too much"""
 NEAR = 4.0
 """roots of a fan's area within which form factors are integrated; a fan is some 1.2 across"""
 ORDER = 2
@@ -40,7 +42,7 @@ class Senders:
     centre: Array
     """(V + N, 3), mm: the centroids of fans"""
     extent: Array
-    """(V + N,), mm^2: of nodes, the mean squared distance to that; 0 of vertices"""
+    """(V + N,), mm^2: of nodes, what their extent adds to squared distances; 0 of vertices"""
     n: Array
     """(V + N, 3), unit: the direction of the mean normal"""
     area: Array
@@ -86,7 +88,7 @@ def senders(mesh: Mesh, spread: float) -> Senders:
     weight = made.sums(shares)
     middle, centre, normal = (made.sums(v * shares[:, None]) / weight[:, None] for v in (x, fans.centre, n))
     square = made.sums(np.square(fans.centre).sum(axis=1) * shares) / weight
-    extent = np.maximum(square - np.square(centre).sum(axis=1), 0.0)
+    extent = WITHIN * np.maximum(square - np.square(centre).sum(axis=1), 0.0)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius, cosine = np.zeros(len(weight)), np.ones(len(weight))
     for a, b in pairwise(made.levels):
