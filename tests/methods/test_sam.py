@@ -14,6 +14,7 @@ from wgsss import frame as shared
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.errors import InputError
+from wgsss.gpu import LIMITS
 from wgsss.graph import Graph
 from wgsss.methods import make_method, sam
 from wgsss.methods.lambert import Lambert
@@ -241,3 +242,14 @@ def test_the_near_side_is_that_of_another_method(gpu, monkeypatch, surface):
     expected = Renderer(scene, KINDS[surface](), (16, 16), gpu).frame(aovs=("M_front",))
     np.testing.assert_array_equal(got.aovs["M_front"], expected.aovs["M_front"])
     assert got.aovs["M_back"].any()
+
+
+def test_a_fitted_map_too_large_for_a_binding_is_mixed_in_parts(gpu, monkeypatch):
+    """What one part gathers, the next one may mix."""
+    scene = lit(SIDE, mesh=ear(500), material=MARBLE, camera=FRONT)
+    method = replace(PLAIN, select="fit")
+    whole = Passes(Stage(gpu, scene), method)
+    monkeypatch.setitem(LIMITS, "max-storage-buffer-binding-size", 300 * 48 + 5)
+    parts = Passes(Stage(gpu, scene), method)
+    assert parts.ran.count("sam/mix") == parts.ran.count("sam/gather") == 2 and whole.ran.count("sam/mix") == 1
+    np.testing.assert_array_equal(parts.mixed, whole.mixed)
