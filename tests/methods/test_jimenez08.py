@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import MATTE, lit, plane
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import minimum_filter
 
 from wgsss import frame as shared
 from wgsss.errors import InputError
@@ -181,16 +181,21 @@ def test_maps_follow_the_distance(gpu, distance):
 
 
 def test_the_nearest_corner_counts_and_without_perspective_the_distance_does_not(gpu):
-    method = SeenTextureSpace(map_size=512)
+    method = SeenTextureSpace(map_size=1024)
+    scene = lit(SIDE, mesh=slab(size=(40, 40, 40)), material=SKIN)
+    stage = Stage(gpu, scene)
+    density = method.texels_per_mm(stage.bodies[0])
 
     def size(camera):
-        scene = lit(SIDE, mesh=slab(size=(40, 40, 40)), material=SKIN, camera=camera)
-        return drawn(picture(gpu, scene, method), "texture_space/dilate")[0]
+        stage.scene = replace(scene, camera=camera)
+        return method.size_seen(shared.begin(Graph(gpu), stage, (96, 64)), stage.bodies[0])
 
-    near, far = (size(PerspectiveCamera((0, 0, 20 + d), (0, 0, 0), fov=60)) for d in (100, 200))
-    assert near == 2 * far < 512
+    for nearest in (15, 30, 60):
+        exact = TEXELS_PER_PIXEL * 64 / (2 * math.tan(math.radians(30)) * nearest) / density * 1024
+        assert exact <= size(PerspectiveCamera((0, 0, 20 + nearest), (0, 0, 0), fov=60)) <= 1.5 * exact
+    exact = TEXELS_PER_PIXEL * 64 / 200 / density * 1024
     near, far = (size(OrthographicCamera((0, 0, d), (0, 0, 0), height=200)) for d in (100, 1000))
-    assert near == far < 512
+    assert exact <= near == far <= 1.5 * exact
 
 
 def test_no_frame_of_a_zoom_waits_for_a_bake_and_memory_stays(gpu, monkeypatch):
@@ -241,11 +246,29 @@ def test_maps_have_values_where_the_irradiance_has_down_to_a_quarter_of_its_size
     assert 0.05 < lit_.mean() < 0.3
     for size, blurred in zip(method.sizes(body), maps, strict=True):
         inside = gpu.read_texture(texture_space.atlas(body, size).ids)[..., 0] >= 1 << 31
+        deep = minimum_filter(inside, 5)  # where filters meet no gutter
         n = 320 // size
         has_value = graph.read(blurred)[..., 3] > 0
         blocks = lit_.reshape(size, n, size, n)
-        assert has_value[inside & blocks.all(axis=(1, 3))].all()
-        assert not has_value[inside & ~maximum_filter(blocks.any(axis=(1, 3)), 3)].any()
+        middle = blocks[:, (n - 1) // 2 : n // 2 + 1, :, (n - 1) // 2 : n // 2 + 1]  # what is read at a texel's centre
+        assert has_value[inside & middle.any(axis=(1, 3))].all()
+        assert not has_value[deep & ~blocks.any(axis=(1, 3))].any()
+
+
+def test_pixels_do_not_count_texels_without_a_value(gpu):
+    """Maps of one value, with holes."""
+    scene = lit(DOWN, material=SKIN, camera=OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=10))
+    stage = Stage(gpu, scene)
+    method = TextureSpace(map_size=64)
+    method.bake(stage)
+    holes = np.random.default_rng(2).random((64, 64, 1)) < 0.3
+    value = np.where(holes, 0.0, [0.5, 0.25, 2.0, 1.0])
+    graph = Graph(gpu)
+    frame = shared.begin(graph, stage, (48, 48))
+    M_front = method._gather(frame, stage.bodies[0], [gpu.texture(value, "rgba16float")], None)
+    graph.run(M_front)
+    expected = SKIN_GAUSSIANS.weights[0] * frame.lighting.unit * [0.5, 0.25, 2.0]
+    np.testing.assert_allclose(graph.read(M_front)[..., :3].reshape(-1, 3), np.tile(expected, (48 * 48, 1)), rtol=2e-3)
 
 
 def test_where_a_back_may_be_seen_nothing_is_culled(gpu):
