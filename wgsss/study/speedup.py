@@ -1,10 +1,10 @@
 """How much faster a frame is for drawing only what is seen (Jimenez & Gutierrez 2008, table 1), in one run.
 
 On a CPU the gains at large distances are several times those of a GPU. There a frame's time is what its texels cost,
-most of it in blurs, and a map of a sixteenth of the texels takes a sixteenth; on a GPU passes and triangles have a price
-of their own, which small maps do not lower. Heads beside the image are not even submitted here, while the paper's are
-clipped triangle by triangle. Near and alone, where only culling saves, a CPU gains no more than a GPU: it has to work in
-groups of texels, all of which must be dark.
+most of it in blurs, and a map of a sixteenth of the texels takes a sixteenth; on a GPU passes and triangles have a
+price of their own, which small maps do not lower. Heads beside the image have no passes here, while the paper's are
+clipped triangle by triangle. Near and alone, where only culling saves, a CPU gains little: it works on groups of
+texels, which it spares only where all of them are dark.
 """
 
 from __future__ import annotations
