@@ -12,6 +12,7 @@ from wgsss.bake.cache import Arrays, cached
 Array = npt.NDArray[Any]
 
 _CELLS = 4.0  # per distance: nearer points whose normals are alike are taken together
+_AT_ONCE = 10_000  # points, so that the pairs fit in memory
 
 
 def turns(positions: Array, normals: Array, distance: float) -> Array:
@@ -43,9 +44,10 @@ def _turns(positions: Array, normals: Array, distance: float) -> Array:
         for values in (positions, normals)
     )
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    near = cKDTree(positions).query_ball_tree(cKDTree(place), distance)
-    of = np.repeat(np.arange(len(near)), [len(found) for found in near])
-    to = np.concatenate([np.asarray(found, np.int64) for found in near])
-    least = np.ones(len(positions))
-    np.minimum.at(least, of, np.einsum("nd,nd->n", normals[of], normal[to]))
+    tree, least = cKDTree(place), np.ones(len(positions))
+    for start in range(0, len(positions), _AT_ONCE):
+        near = tree.query_ball_point(positions[start : start + _AT_ONCE], distance)
+        of = start + np.repeat(np.arange(len(near)), [len(found) for found in near])
+        to = np.concatenate([np.asarray(found, np.int64) for found in near])
+        np.minimum.at(least, of, np.einsum("nd,nd->n", normals[of], normal[to]))
     return np.arccos(np.clip(least, -1.0, 1.0)).astype(np.float32)
