@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wgsss.bake.sam.training import EVEN_WEIGHT, SKIES, SKY_WEIGHT, SUNS, spiral, training
+from wgsss.bake.sam.training import COMPONENTS, EVEN_WEIGHT, SKIES, SKY_WEIGHT, SUNS, compressed, spiral, training
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes import sphere
 
@@ -43,3 +43,17 @@ def test_directions_are_spread_evenly():
     np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0)
     np.testing.assert_allclose(w.T @ w / SUNS, np.eye(3) / 3, atol=0.01)
     np.testing.assert_allclose(w.mean(axis=0), 0.0, atol=0.01)
+
+
+def test_compressed_light_has_the_products_of_all():
+    """Of means over parts of the surface, which fade into each other as what scatters does."""
+    mesh = two_balls()
+    lights, V = training(mesh), len(mesh.positions)
+    few = compressed(lights, np.ones(V))
+    assert few.shape == (V, COMPONENTS)
+    nearness = np.exp(-np.square(mesh.positions[::40, None] - mesh.positions).sum(axis=2) / 2.0)
+    means = nearness / nearness.sum(axis=1, keepdims=True)
+    products = (means @ lights.T) @ (means @ lights.T).T
+    np.testing.assert_allclose((means @ few) @ (means @ few).T, products, rtol=2e-3)
+    weighted = compressed(lights, np.where(np.arange(V) == 7, 1e6, 1.0))
+    np.testing.assert_allclose(np.square(weighted[7]).sum(), np.square(lights[:, 7]).sum(), rtol=1e-4)

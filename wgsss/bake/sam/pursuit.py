@@ -11,7 +11,7 @@ from wgsss.bake.sam.nonnegative import nonnegative
 
 Array = npt.NDArray[Any]
 
-ROUNDS = 3
+ROUNDS = 2
 """times that each choice is made once more: a quarter to a third less error at three choices, a fifth at eight"""
 
 
