@@ -4,7 +4,7 @@ python examples/sam_convergence.py happy_buddha.obj --material marble --size-mm 
 
 Relative RMSE of M_back, at random vertices, against the sum of form factors times L_d over all vertices on the back
 side: mean over four directional lights with shadows, and under an even sky. With --integral also that of this sum
-itself, against the integral over the surface between the vertices. `fit` ends at 13 samples, since its bake takes far
+itself, against the integral over the surface between the vertices. `fit` ends at 20 samples, since its bake takes
 longer for more.
 """
 
@@ -18,7 +18,7 @@ from wgsss.bake.sam import SELECTIONS
 from wgsss.scene import load_scene
 
 COLOURS = {"top": "#D55E00", "coarse": "#009E73", "fit": "#0072B2"}
-MOST = {"top": 256, "coarse": 256, "fit": 13}
+MOST = {"top": 256, "coarse": 256, "fit": 20}
 
 
 def plot(found: dict[str, list[tuple[int, float, float]]], title: str, path: Path) -> None:
