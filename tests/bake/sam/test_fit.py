@@ -89,3 +89,14 @@ def test_meshes_whose_fans_are_never_near(gpu):
     entries = select_fit(gpu, thick, PROFILE, 2)
     K = all_form_factors(gpu, thick).sum(axis=1)
     np.testing.assert_allclose(received(entries, np.ones(len(K)), fan_areas(thick)), K, rtol=0.1)
+
+
+def test_what_the_tree_misses_is_made_up_for(gpu):
+    """Nodes are points at their middles: a ball of a few mean free paths would receive a hundredth too much."""
+    mesh, profile = sphere(6.0, 3000), MATERIALS["wholemilk"].profile
+    x, n = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+    some = np.arange(0, len(x), 97)
+    receiver, sender = np.nonzero((np.einsum("oid,od->oi", x - x[some, None], n[some]) < 0) & (n[some] @ n.T < 0))
+    wanted = form_factors(gpu, mesh, profile, np.stack([some[receiver], sender], axis=1)).sum(axis=0)
+    found = received(select_fit(gpu, mesh, profile, 3), np.ones(len(x)), fan_areas(mesh))[some].sum(axis=0)
+    np.testing.assert_allclose(found, wanted, rtol=0.006)

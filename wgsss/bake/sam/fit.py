@@ -32,6 +32,8 @@ PATCH = 1
 """level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
 FAINTEST = 1e-3
 """share of what a plane would give back, below which nothing shines through to a vertex"""
+COUNTED = 256
+"""vertices at which all form factors are summed one by one, to tell what the tree misses"""
 AT_ONCE = 256
 """patches of a thread's task"""
 _BLOCK = 4_000_000  # numbers that a batch of patches holds at a time, about
@@ -81,12 +83,23 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
             bar.update(done)
         weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
         sender[~weight.any(axis=2)] = -1
+        total *= _missed(s, K, total)
         spacing = float(np.sqrt(s.area[:V].mean()))
         mixed = mix(mesh.positions, mesh.normals, spacing, weight.sum(axis=1), gathered, responses, total)
     is_mean = sender >= V
     used, at = np.unique(sender[is_mean] - len(s.area), return_inverse=True)
     sender[is_mean] = V + at
     return Entries(sender, weight, V, tree=s.tree, blend=means.only(used), mix=mixed)
+
+
+def _missed(s: Senders, K: QuickFormFactors, total: Array) -> Array:
+    """How much more (3,) arrives at some vertices in all than `total` (V, 3), which nodes told: these are as if all of
+    one were at its middle, and those far away are left out."""
+    some = np.random.default_rng(0).permutation(np.flatnonzero(total.any(axis=1)))[:COUNTED]
+    told, exact = total[some].sum(axis=0, dtype=np.float64), np.zeros(3)
+    for vertex in some:
+        exact += K(s, np.array([[vertex]]), np.arange(len(total))[None])[0, :, 0].sum(axis=1, dtype=np.float64)
+    return np.where(told > 0.0, exact / _positive(told), 1.0).astype(np.float32)
 
 
 def _lights(s: Senders, means: Blend, lights: Array) -> Array:

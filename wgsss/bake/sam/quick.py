@@ -18,12 +18,14 @@ Array = npt.NDArray[Any]
 
 BEYOND = 5e-4
 """share of the light of a plane that comes from farther away than what is looked at"""
+TAIL = 1e-5
+"""share of it that comes from farther away than what is known at all"""
 FAINT = 3e-3
 """share of what leaves a plane in all, below which a node is not looked into"""
 NEAREST = 3.0
 """roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
 _SHIFT = 16  # bits of a squared distance that the table of R_d leaves out: it has 128 entries each time that it doubles
-_LEAST = 1e-3  # its first distance, of the last
+_LEAST = 1e-3  # its first distance, of what is looked at
 
 
 class QuickFormFactors:
@@ -32,7 +34,8 @@ class QuickFormFactors:
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
         self.farthest = float(profile.range(BEYOND).max())
         self.faint = FAINT * float(profile.total.max())
-        ends = np.square(np.array([_LEAST * self.farthest, self.farthest], np.float32)).view(np.int32) >> _SHIFT
+        known = np.array([_LEAST * self.farthest, profile.range(TAIL).max()], np.float32)
+        ends = np.square(known).view(np.int32) >> _SHIFT
         self._first, last = int(ends[0]), int(ends[1])
         middles = (np.arange(self._first, last + 1, dtype=np.int32) << _SHIFT) + (1 << (_SHIFT - 1))
         R = profile.reflectance(np.sqrt(middles.view(np.float32).astype(np.float64))).astype(np.float32)
