@@ -35,7 +35,7 @@ class Image:
             `normal` (world space).
         timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run includes its compilation.
         graph: the frame's graph, for `str` and `dot`.
-        metadata: what made the image, in words: scene, method, knobs, adapter, exposure, tone_map, time_s.
+        metadata: what made the image, in words: scene, method, knobs, adapter, exposure, tone_map, bloom, time_s.
     """
 
     pixels: Array
@@ -123,6 +123,7 @@ class Renderer:
             "adapter": self.gpu.name,
             "exposure": f"{scene.exposure:g}",
             "tone_map": scene.tone_map,
+            "bloom": f"{scene.bloom:g}",
             "time_s": f"{self.stage.time_s:g}",
         }
 

@@ -44,7 +44,8 @@ class Passes:
         drawn = self.method.passes(frame)
         (passed,) = [p for p in graph.passes if p.name == "point_cloud/gather"]
         entering = passed.reads["entering"]
-        wanted = [drawn.M_front, drawn.M_back, drawn.irradiance, entering, frame.gbuffer.depth, frame.gbuffer.normal]
+        irradiance = shared.irradiance_pixels(frame)
+        wanted = [drawn.M_front, drawn.M_back, irradiance, entering, frame.gbuffer.depth, frame.gbuffer.normal]
         graph.run(*wanted, frame.gbuffer.where_seen)
         self.seen = graph.read(frame.gbuffer.where_seen)[..., 2] > 0
         self.M_front, self.M_back, self.irradiance = (graph.read(h)[self.seen][:, :3].astype(float) for h in wanted[:3])

@@ -222,5 +222,5 @@ def test_same_scene_same_bits(gpu):
 
 def test_it_goes_with_texture_space_alone():
     assert type(make_method("texture+tsm")) is type(make_method("deon07"))
-    with pytest.raises(InputError, match="TranslucentShadowMaps reads what TextureSpace makes"):
+    with pytest.raises(InputError, match="translucency tsm goes with surface texture, not with screen"):
         make_method("screen+tsm")

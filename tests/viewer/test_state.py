@@ -65,7 +65,7 @@ def test_the_command_draws_what_is_shown(gpu: Gpu, tmp_path: Path, change: str) 
         state.wear({"preset": "ketchup", "roughness": 0.31})
     if change == "all":
         camera = OrthographicCamera((0.0, 10.0, 80.0), (0.0, 0.0, 0.0), height=41.7)
-        state.scene = replace(state.scene, camera=camera, exposure=-0.7, tone_map="reinhard")
+        state.scene = replace(state.scene, camera=camera, exposure=-0.7, tone_map="reinhard", bloom=0.2)
         state.time_s = 0.3
     file = tmp_path / "drawn.png"
     assert main([*arguments(state)[1:], "-o", str(file)]) == 0

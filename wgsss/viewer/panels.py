@@ -85,9 +85,11 @@ def _compared(window: Window) -> None:
     state = window.state
     state.comparison = _choice("show", state.comparison, COMPARISONS)
     state.layer = _choice("layer", state.layer, LAYERS)
-    changed, exposure = imgui.slider_float("exposure", state.scene.exposure, -6.0, 6.0)
-    if changed:
-        state.scene = replace(state.scene, exposure=exposure)
+    for name, low, high in (("exposure", -6.0, 6.0), ("bloom", 0.0, 1.0)):
+        changed, value = imgui.slider_float(name, getattr(state.scene, name), low, high)
+        if changed:
+            shown: Any = {name: float(np.clip(value, low, high))}
+            state.scene = replace(state.scene, **shown)
     for label, act in (
         ("reset", state.reset),
         ("screenshot", window.screenshot),

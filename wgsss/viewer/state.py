@@ -90,10 +90,9 @@ class State:
             words += ["--camera", _table(scene.camera, CAMERAS)]
         if scene.lights != self.opened.lights:
             words += [word for light in scene.lights for word in ("--light", _table(light, LIGHTS))]
-        if scene.exposure != self.opened.exposure:
-            words += ["--exposure", repr(scene.exposure)]
-        if scene.tone_map != self.opened.tone_map:
-            words += ["--tone-map", scene.tone_map]
+        for name in ("exposure", "tone_map", "bloom"):
+            if getattr(scene, name) != getattr(self.opened, name):
+                words += [f"--{name.replace('_', '-')}", str(getattr(scene, name))]
         name = name_of(method)
         words += ["--method", name]
         for knob, value in vars(method).items():
