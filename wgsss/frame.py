@@ -76,8 +76,11 @@ class Frame:
         return {name: getattr(self.gbuffer, name) for name in names}
 
 
-def begin(graph: Graph, stage: Stage, size: tuple[int, int]) -> Frame:
-    """Declare g-buffer, shadows and tables of a frame of `size` (width, height) pixels."""
+def begin(graph: Graph, stage: Stage, size: tuple[int, int], lighting: SimpleNamespace | None = None) -> Frame:
+    """Declare g-buffer, shadows and tables of a frame of `size` (width, height) pixels.
+
+    `lighting` is that of an earlier frame, with its shadow maps as a texture that persists, where nothing has moved.
+    """
     view = _view(stage.scene, size)
     gbuffer = _gbuffer(graph, stage, size, view)
     tables = {}
@@ -85,7 +88,7 @@ def begin(graph: Graph, stage: Stage, size: tuple[int, int]) -> Frame:
         key = (body.material.roughness, body.material.eta)
         if key not in tables:
             tables[key] = rho_dt_table(graph, body.material)
-    return Frame(graph, stage, size, view, gbuffer, _lighting(graph, stage), tables)
+    return Frame(graph, stage, size, view, gbuffer, lighting or _lighting(graph, stage), tables)
 
 
 def _world_points(scene: Scene) -> npt.NDArray[np.float64]:

@@ -11,7 +11,7 @@ from wgsss.bake.thickness import local_thickness
 from wgsss.gpu import Gpu
 from wgsss.methods import make_method
 from wgsss.rendering import Renderer
-from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, load_scene
+from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, Scene, load_scene
 from wgsss.viewer.layers import SCENE_LAYERS
 from wgsss.viewer.pictures import LAYERS, Easel
 
@@ -96,3 +96,19 @@ def test_the_stretch_of_a_plane_is_even(gpu: Gpu) -> None:
     colours = drawing.graph.read(display)[drawing.seen][:, :3]
     middle = np.round(255 * np.array([0.865, 0.865, 0.865]))
     assert np.abs(colours - middle).max() < 12, "the middle of the map's colours, as 0.865 of each channel"
+
+
+def test_shadows_are_drawn_again_only_where_lights_or_meshes_moved(gpu: Gpu) -> None:
+    easel = Easel(gpu)
+    lit = replace(SCENE, lights=(SUN,))
+
+    def shadows(scene: Scene, time_s: float = 0.0, layer: str = "image") -> int:
+        drawing = easel.draw(scene, METHODS[1:], SIZE, time_s, layer)
+        return sum(item.module.name == "frame/shadow" for item in drawing.graph.ran)
+
+    assert shadows(lit) == 1
+    assert shadows(replace(lit, camera=CHANGES["camera"].camera)) == 0
+    assert shadows(lit, layer="shadow map") == 0
+    assert shadows(replace(lit, lights=(replace(SUN, direction=(0.0, -1.0, 0.0)),))) == 1
+    assert shadows(lit) == 1
+    assert shadows(lit, 0.5) == 1

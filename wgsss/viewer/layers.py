@@ -46,7 +46,7 @@ def scene_layer(frame: Frame, layer: str) -> Handle | None:
     if layer == "shadow map":
         if not frame.lighting.views:
             return None
-        size = frame.lighting.shadow_maps.size
+        size = frame.lighting.shadow_maps.size[:2]
         shown: Handle = graph.draw("viewer/shadow", size=size, shadow_maps=frame.lighting.shadow_maps)
         return shown
     drawn: Any = None

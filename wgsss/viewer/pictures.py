@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,6 +66,8 @@ class Easel:
         self.gpu = gpu
         self._stage: Stage | None = None
         self._baked: set[Method] = set()
+        self._lighting: tuple[Any, Any, Graph] | None = None
+        """what shadows were drawn for, the lighting with them, and the graph that keeps them"""
 
     def stage(self, scene: Scene, methods: Sequence[Method], time_s: float = 0.0) -> Stage:
         """The scene, ready for the methods. Bakes, which may take a while the first time."""
@@ -93,7 +96,9 @@ class Easel:
         """A picture by each method at a size in pixels, a time in seconds."""
         stage = self.stage(scene, methods, time_s)
         graph = Graph(self.gpu)
-        frame = shared.begin(graph, stage, size)
+        shone = id(stage), stage.scene.lights, time_s
+        kept = self._lighting[1] if self._lighting is not None and self._lighting[0] == shone else None
+        frame = shared.begin(graph, stage, size, kept)
         found = []
         common = scene_layer(frame, layer) if layer in SCENE_LAYERS else None
         for drawn in [draw(frame, method) for method in methods]:
@@ -107,7 +112,14 @@ class Easel:
             passes = tuple(item.name for item in graph.needed(*([display] if display else []), *M))
             found.append(Picture(display, M, passes))
         seen = frame.gbuffer.where_seen
-        graph.run(seen, *{h: None for p in found for h in (p.display, *p.M) if h is not None}, timed=timed)
+        shadows = frame.lighting.shadow_maps
+        wanted = [seen, *(h for p in found for h in (p.display, *p.M) if h is not None)]
+        wanted += [shadows] if isinstance(shadows, Handle) else []
+        graph.run(*dict.fromkeys(wanted), timed=timed)
+        if isinstance(shadows, Handle):
+            lighting = copy(frame.lighting)
+            lighting.shadow_maps = shadows.resource.gpu
+            self._lighting = shone, lighting, graph
         return Drawing(graph, seen, found)
 
 
