@@ -181,7 +181,7 @@ class Window:
         present = [m for m in methods if m is not None]
         self._present = present
         try:
-            self.drawing = self.easel.draw(state.scene, present, size, state.time_s, state.layer, timed=not moving)
+            self.drawing = self.easel.draw(state.scene, present, size, state.time_s, state.layer, timed=scale == 1.0)
             self.gpu.fence()
             pictures = iter(self.drawing.pictures)
             self.sides = [None if m is None else next(pictures) for m in methods]
