@@ -1,9 +1,10 @@
 """How long spatial adjacency maps take to bake, beside what their paper reports. Nothing comes from the cache.
 
-python examples/sam_bake_times.py --vertices 5000 20000 --mesh dragon.obj marble 100
+python examples/sam_bake_times.py --vertices 5000 20000 --mesh dragon.obj marble 100 -o times.png
 
 Wall seconds, and CPU seconds of all threads, which other work on the machine lengthens less. What shaders take to
-compile is not counted.
+compile is not counted. The chart has CPU seconds over vertices, and those of a vertex over how far light reaches: the
+distance beyond which one per cent of it leaves, of the mesh's longest side.
 """
 
 import argparse
@@ -11,11 +12,15 @@ import os
 import sys
 import tempfile
 import time
+from pathlib import Path
+
+import numpy as np
 
 from wgsss.bake.sam import SELECTIONS, spatial_adjacency_map
 from wgsss.gpu import default_gpu
 from wgsss.scene import Scene, load_scene
 
+COLOURS = {"top": "#D55E00", "coarse": "#009E73", "fit": "#0072B2"}
 PAPER = {  # Maisch & Ropinski 2017, section 5.3: 3 samples by `top`, on an i7-4790 with four cores
     "Animated": "0.165 s",
     "Head": "1.152 s",
@@ -33,7 +38,9 @@ def main(argv: list[str] | None = None) -> None:
     add("--vertices", nargs="*", type=int, default=[5000, 20_000, 80_000])
     add("--mesh", nargs=3, action="append", default=[], metavar=("FILE", "MATERIAL", "SIZE_MM"))
     add("--select", nargs="+", choices=tuple(SELECTIONS), default=list(SELECTIONS))
+    add("--materials", nargs="*", default=["skin1", "marble", "ketchup", "wholemilk"], help="of the scene, at 20k")
     add("--samples", type=int, default=3)
+    add("-o", "--output", type=Path, help="a chart")
     args = parser.parse_args(argv)
 
     print("mesh                          vertices  select  wall s   cpu s  bytes a vertex", flush=True)
@@ -43,6 +50,9 @@ def main(argv: list[str] | None = None) -> None:
             bake(load_scene("sphere", vertices=300, material="marble"), args.samples, select)
         scenes = [load_scene(args.scene, vertices=vertices) for vertices in args.vertices]
         scenes += [load_scene(file, material=name, size_mm=float(size)) for file, name, size in args.mesh]
+        if args.output:
+            scenes += [load_scene(args.scene, vertices=20_000, material=name) for name in args.materials]
+        found: dict[str, list[tuple[int, float, float]]] = {}
         for scene in scenes:
             body = scene.objects[0]
             name = f"{scene.name}, {body.material.name}"
@@ -50,8 +60,30 @@ def main(argv: list[str] | None = None) -> None:
                 print(f"{name}, {select}", file=sys.stderr)
                 wall, cpu, size = bake(scene, args.samples, select)
                 vertices = len(body.mesh.positions)
+                reach = body.material.profile.range(0.01).max() / np.ptp(body.mesh.bounds, axis=0).max()
+                found.setdefault(select, []).append((vertices, float(reach), cpu))
                 print(f"{name:28}  {vertices:8}  {select:6}  {wall:6.2f}  {cpu:6.2f}  {size:14}", flush=True)
     print("\nthe paper:", ", ".join(f"{name} {took}" for name, took in PAPER.items()))
+    if args.output:
+        plot(found, args.output)
+
+
+def plot(found: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
+    """Seconds over vertices, and of a vertex over the reach of light."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    over_vertices, over_reach = figure.subplots(1, 2)
+    for select, rows in found.items():
+        vertices, reach, cpu = np.array(rows).T
+        over_vertices.loglog(vertices, cpu, "o", color=COLOURS[select], label=select)
+        over_reach.loglog(reach, 1e6 * cpu / vertices, "o", color=COLOURS[select])
+    over_vertices.set(xlabel="vertices", ylabel="CPU seconds")
+    over_reach.set(xlabel="reach of light over the mesh's size", ylabel="CPU microseconds a vertex")
+    for axis in (over_vertices, over_reach):
+        axis.grid(alpha=0.25)
+    figure.legend(loc="outside lower center", ncols=len(found), frameon=False)
+    figure.savefig(path, dpi=110)
 
 
 def bake(scene: Scene, samples: int, select: str) -> tuple[float, float, int]:

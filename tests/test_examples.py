@@ -82,10 +82,14 @@ def test_sam_flicker(script: Callable[..., list[list[str]]]) -> None:
     assert all(float(row[6]) < float(row[2]) for row in rows[2:]), "what is blended flickers less"
 
 
-def test_sam_bake_times(script: Callable[..., list[list[str]]]) -> None:
-    rows = script("sam_bake_times", "--scene", "wave", "--vertices", "300", "500", "--select", "top")
+def test_sam_bake_times(script: Callable[..., list[list[str]]], tmp_path: Path) -> None:
+    chart = tmp_path / "a.png"
+    size = ["--vertices", "300", "500", "--select", "top", "--materials"]
+    rows = script("sam_bake_times", "--scene", "wave", *size, "-o", str(chart))
     assert [row[3] for row in rows[1:3]] == ["top", "top"]
     assert all(float(row[4]) > 0 and row[-1] == "48" for row in rows[1:3])
+    with Picture.open(chart) as picture:
+        assert np.asarray(picture).std() > 10
 
 
 def test_screen_space_angles(script: Callable[..., list[list[str]]], tmp_path: Path) -> None:
