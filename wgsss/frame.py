@@ -249,7 +249,6 @@ def _specular(frame: Frame) -> Handle:
 
 def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: Handle) -> Handle:
     """Radiance towards the viewer with coverage in alpha (Maisch & Ropinski 2017, eq. 5)."""
-    nothing = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
     radiance: Any = None
     for body in frame.stage.bodies:
         radiance = frame.graph.draw(
@@ -260,7 +259,7 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
             params={"clip_to_world": frame.view.clip_to_world, "eye": frame.view.eye},
             rho_dt_table=frame.rho_dt_table(body),
             M_front=M_front,
-            M_back=M_back or nothing,
+            M_back=M_back or frame.stage.gpu.black,
             specular=reflected,
             **frame.seen("where_seen", "normal", "depth"),
         )

@@ -196,6 +196,11 @@ class Gpu:
             size=(1, 1, 1), format="depth32float", usage=wgpu.TextureUsage.TEXTURE_BINDING
         )
 
+    @cached_property
+    def black(self) -> Any:
+        """A black texture of one texel, to bind where there is none."""
+        return self.texture(np.zeros((1, 1, 4)), "rgba16float")
+
     def read_texture(self, texture: Any) -> np.ndarray:
         """The texels of a texture: (height, width, channels), with a leading axis of layers where there are several."""
         scalar, channels = FORMATS[texture.format]

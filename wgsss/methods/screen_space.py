@@ -88,7 +88,7 @@ class ScreenSpace:
             **frame.seen("where_seen", "normal", "base_color", "depth"),
         )
         terms = self.weights(body)
-        M: Any = frame.stage.shared("black", lambda: frame.stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
+        M: Any = frame.stage.gpu.black
         for i, (taps, buffer) in enumerate(terms):
             before, M = M, entered.entering
             for direction in (0, 1):

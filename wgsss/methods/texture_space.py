@@ -23,7 +23,8 @@ from wgsss.stage import Body, Stage
 
 SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
 MOST_HALVINGS = 2  # smaller maps would lose whole charts
-_SLOTS = 6  # of wgsl/texture_space/gather.wgsl
+SLOTS = 6
+"""of the modules that read blurred maps, for Gaussians"""
 # The directions of a separable blur are undefined where the surface faces the axis that they turn about. With another
 # axis for each Gaussian, no place is undefined for all.
 _AXES = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -81,7 +82,7 @@ class TextureSpace:
             if maps := self.maps(frame, body):
                 M_front = self._gather(frame, body, maps, M_front)
         if M_front is None:  # nothing is in the image
-            M_front = self._gather(frame, frame.stage.bodies[0], [_black(frame.stage)], None)
+            M_front = self._gather(frame, frame.stage.bodies[0], [frame.stage.gpu.black], None)
         return Diffused(M_front)
 
     def maps(self, frame: Frame, body: Body) -> list[Handle]:
@@ -90,9 +91,8 @@ class TextureSpace:
 
     def _gather(self, frame: Frame, body: Body, maps: list[Any], into: Handle | None) -> Any:
         """M_front of a body, drawn onto `into`: the sum of its maps by the profile's weights."""
-        weights = np.zeros((_SLOTS, 4))
+        weights = np.zeros((SLOTS, 4))
         weights[: len(maps), :3] = self.profile(body).weights[: len(maps)] * frame.lighting.unit
-        slots: dict[str, Any] = {f"blurred_{i}": maps[min(i, len(maps) - 1)] for i in range(_SLOTS)}
         return frame.graph.draw(
             "texture_space/gather",
             into=into,
@@ -100,7 +100,7 @@ class TextureSpace:
             count=6,
             params={"weights": weights, "rectangle": rectangle(frame, body)},
             surface=body.surface,
-            **slots,
+            **by_slot(maps),
             **frame.seen("where_seen", "base_color"),
         )
 
@@ -154,5 +154,6 @@ def atlas(body: Body, size: int) -> Charts:
     return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, surface, size))
 
 
-def _black(stage: Stage) -> Any:
-    return stage.shared("black", lambda: stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
+def by_slot(maps: list[Any]) -> dict[str, Any]:
+    """Blurred maps by binding name; slots to spare have the last one, and no weight."""
+    return {f"blurred_{i}": maps[min(i, len(maps) - 1)] for i in range(SLOTS)}

@@ -37,7 +37,7 @@ from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.methods.screen_space import rectangle
-from wgsss.methods.texture_space import TextureSpace
+from wgsss.methods.texture_space import SLOTS, TextureSpace, by_slot
 from wgsss.scene import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
 from wgsss.stage import Body, Stage
 
@@ -45,7 +45,6 @@ Source = DirectionalLight | PointLight | RectLight | SphereLight
 
 SIDE = {1: 1024, 6: 512}
 """of a map, texels, by how many views a light has"""
-_SLOTS = 6  # of wgsl/tsm/transmit.wgsl
 
 
 @dataclass(frozen=True)
@@ -86,17 +85,15 @@ def _through(
     """M_back by a light, added to what there is `so_far`. It has maps of what its `own` emitters give, if not the
     surface's."""
     stage = frame.stage
-    nothing = stage.shared("black", lambda: stage.gpu.texture(np.zeros((1, 1, 4)), "rgba16float"))
     alone = frame if own is None else _lit_by(frame, own)
     M_back: Any = None
     for body in stage.bodies:
         blurred = surface.blurs(alone, body if own is None else _without_sky(body))
         profile = surface.profile(body)
-        gaussians = np.zeros((_SLOTS, 4))
+        gaussians = np.zeros((SLOTS, 4))
         gaussians[:, 3] = 1.0
         gaussians[: len(blurred), :3] = profile.weights * frame.lighting.unit
         gaussians[: len(blurred), 3] = profile.variances
-        maps: dict[str, Any] = {f"blurred_{i}": blurred[min(i, len(blurred) - 1)] for i in range(_SLOTS)}
         seen = _seen_from(light, body)
         where = _meet(frame, body, seen.views)
         M_back = frame.graph.draw(
@@ -116,8 +113,8 @@ def _through(
             entry=where.x_i,
             entry_normal=where.n_i,
             entry_atlas=where.atlas,
-            so_far=so_far or nothing,
-            **maps,
+            so_far=so_far or stage.gpu.black,
+            **by_slot(blurred),
             **frame.seen("where_seen", "normal", "base_color", "depth"),
         )
     return M_back

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, OrthographicCamera, RectLight, Scene
+from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Object, OrthographicCamera, RectLight, Scene
 from wgsss.scene.light import Light
 
 Array = npt.NDArray[np.float64]
@@ -81,9 +82,6 @@ def turn_light(light: Light, camera: Camera, right: float, up: float, centre: An
 
 def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
     """The nearest point of a still scene's surface, world mm, at -1 to 1 across and up the picture; None: nothing."""
-    from trimesh import Trimesh
-    from trimesh.ray.ray_pyembree import RayMeshIntersector
-
     camera = scene.camera
     to_world = np.linalg.inv(camera.projection(aspect, 1.0, 2.0) @ camera.view())
     near, far = ((to_world @ (right, up, depth, 1.0)) for depth in (0.0, 1.0))
@@ -93,9 +91,16 @@ def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
     )
     hits = []
     for thing in scene.objects:
-        caster = RayMeshIntersector(Trimesh(thing.placed, thing.mesh.faces, process=False, validate=False))
-        hits += list(caster.intersects_location([start], [towards], multiple_hits=False)[0])
+        hits += list(_caster(thing).intersects_location([start], [towards], multiple_hits=False)[0])
     return min(hits, key=lambda hit: float((hit - start) @ towards), default=None)
+
+
+@lru_cache(maxsize=32)
+def _caster(thing: Object) -> Any:
+    from trimesh import Trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    return RayMeshIntersector(Trimesh(thing.placed, thing.mesh.faces, process=False, validate=False))
 
 
 def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:

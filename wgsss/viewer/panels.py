@@ -10,6 +10,7 @@ import numpy as np
 from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method, name_of
 from wgsss.reference import REFERENCES
 from wgsss.scene import MATERIALS
+from wgsss.scene.scenefile import LIGHTS
 from wgsss.study.light_types import light_types
 from wgsss.viewer.pictures import LAYERS
 from wgsss.viewer.state import COMPARISONS
@@ -135,14 +136,13 @@ def _light(window: Window) -> None:
     from imgui_bundle import imgui
 
     state = window.state
-    offered = light_types(state.scene, state.time_s)
-    kinds = {type(scene.lights[0]).__name__: scene.lights[0] for scene in offered.values()}
     first: Any
     first, *others = state.scene.lights
-    shown = type(first).__name__
-    chosen = _choice("type", shown, dict.fromkeys([shown, *kinds]))
-    if chosen != shown:
-        first = kinds[chosen]
+    shown = next(name for name, kind in LIGHTS.items() if kind is type(first))
+    chosen = _choice("type", shown, dict.fromkeys([shown, *(name for name in LIGHTS if name != "sphere")]))
+    if chosen != shown:  # one as bright, from behind and aside
+        offered = [scene.lights[0] for scene in light_types(state.scene, state.time_s).values()]
+        first = next(light for light in offered if type(light) is LIGHTS[chosen])
     power = next(f.name for f in fields(first) if f.name in ("irradiance", "intensity", "radiance"))
     value = getattr(first, power)
     strength = max(*value, 1e-6)
