@@ -12,6 +12,8 @@ from wgsss.gpu import Gpu
 from wgsss.methods import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, Scene, load_scene
+from wgsss.stage import Stage
+from wgsss.viewer import layers
 from wgsss.viewer.layers import SCENE_LAYERS
 from wgsss.viewer.pictures import LAYERS, Easel
 
@@ -65,16 +67,26 @@ def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
         assert (lambert.display is None) == (layer == "M_back")
 
 
-def test_layers_of_the_scene_are_the_same_for_all_methods(gpu: Gpu) -> None:
-    scene = load_scene("sphere", vertices=500)
-    drawing = Easel(gpu).draw(scene, METHODS, SIZE, layer="thickness")
+def test_layers_of_the_scene_are_the_same_for_all_methods_and_as_coloured(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    colour = np.array([0.2, 0.5, 0.8])
+    monkeypatch.setitem(layers._PAINTED, "thickness", lambda body: np.tile(colour, (len(body.layout.vertex), 1)))
+    drawing = Easel(gpu).draw(load_scene("sphere", vertices=500), METHODS, SIZE, layer="thickness")
     first, second = drawing.pictures
     assert first.display is second.display and first.display is not None
     shown = drawing.graph.read(first.display)
     assert (shown[..., 3] > 0).sum() == drawing.seen.sum()
-    thickness = local_thickness(scene.objects[0].mesh, scene.objects[0].material.profile).mean(axis=0)
-    encoded = np.where(thickness <= 0.0031308, 12.92 * thickness, 1.055 * thickness ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(shown[drawing.seen][:, :3].mean(axis=0) / 255.0, encoded, atol=0.02)
+    encoded = 255.0 * (1.055 * colour ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(shown[drawing.seen][:, :3], np.tile(encoded, (drawing.seen.sum(), 1)), atol=0.6)
+
+
+def test_thickness_is_that_of_the_render_vertices(gpu: Gpu) -> None:
+    stage = Stage(gpu, load_scene("ear", vertices=1000))
+    (body,) = stage.bodies
+    wanted = local_thickness(body.rest.mesh, body.material.profile)
+    assert wanted.max() > 0.1
+    np.testing.assert_array_equal(layers._thickness(body), wanted[body.layout.vertex])
 
 
 def test_a_shadow_map_shows_what_the_light_sees(gpu: Gpu) -> None:
@@ -83,7 +95,11 @@ def test_a_shadow_map_shows_what_the_light_sees(gpu: Gpu) -> None:
     drawing = easel.draw(scene, METHODS[1:], SIZE, layer="shadow map")
     display = drawing.pictures[0].display
     assert display is not None
-    lit = drawing.graph.read(display)[..., 3] > 0
+    shown = drawing.graph.read(display)
+    lit = shown[..., 3] > 0
+    # The view goes from half a radius to three and a half; the ball is met from one radius on.
+    assert shown[..., 0].max() == pytest.approx(255.0 * (1.055 * (5 / 6) ** (1 / 2.4) - 0.055), abs=1.5)
+    assert shown[lit, 0].min() < 255.0 * (1.055 * 0.53 ** (1 / 2.4) - 0.055), "at the rim, one radius deeper"
     assert lit.mean() == pytest.approx(np.pi / 4 / 1.02**2, rel=0.03), "a disc that fits"
     dark = easel.draw(replace(scene, lights=(EnvironmentLight(),)), METHODS[1:], SIZE, layer="shadow map")
     assert dark.pictures[0].display is None
