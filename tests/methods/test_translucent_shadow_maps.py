@@ -185,6 +185,24 @@ def test_a_ball_much_wider_than_the_gaussians_lets_nothing_through(gpu):
         assert image.aovs["M_back"].max() < 0.03 * WAX.profile.total.max()
 
 
+def test_what_enters_round_an_edge_fades_in_by_the_way_over_the_surface(gpu):
+    """A block lit from above and behind, seen from the front. Between faces at a right angle the ray is not corrected,
+    and the way over the surface is taken to be twice as long: it counts in full from four sigmas on."""
+    wax = replace(MATTE, gaussians=SumOfGaussians(np.ones(1), np.full((1, 3), 0.9)))
+    camera = OrthographicCamera((0, 8, 50), (0, 8, 0), height=6)
+    scene = lit(
+        DirectionalLight((0, -(0.75**0.5), 0.5), (1, 1, 1)), mesh=slab((20.0,) * 3, 3000), material=wax, camera=camera
+    )
+    got = frame(gpu, scene, map_size=1024).aovs["M_back"][:, SIZE // 2, 0]
+    below = 10.0 - (8.0 + pixels(camera.height)[1][:, 0])
+    t = below / 0.75**0.5
+    share = np.clip(2 * t / 4, 0, 1)
+    blurred = norm.cdf(0.5 * t)  # the front is dark
+    expected = 0.9 * 0.75**0.5 * blurred * np.exp(-t * t / 2) * share**2 * (3 - 2 * share)
+    seen = (below > 0.5) & (below < 2.5)
+    np.testing.assert_allclose(got[seen], expected[seen], rtol=0.1, atol=0.01)
+
+
 def test_other_objects_keep_the_light_off_but_do_not_shine(gpu):
     shade = Object(Mesh(plane(side=60.0).positions[:, [0, 2, 1]] + np.float32([0, 0, -6]), plane().faces), WAX)
     assert M_back(gpu, BEHIND, extra=(shade,)).max() < 1e-4
