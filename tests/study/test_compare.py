@@ -12,14 +12,12 @@ from scenes import MATTE, lit, plane
 from standins import ERROR, FACTOR, Scaled, Volume, lambert
 
 from wgsss.errors import InputError
-from wgsss.graph import Graph
 from wgsss.methods import make_method
 from wgsss.reference import REFERENCES
-from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, Object, PerspectiveCamera, PointLight, RectLight, Scene
 from wgsss.scene.shapes import sphere
 from wgsss.study import compare as module
-from wgsss.study.compare import compare, footprint, named
+from wgsss.study.compare import compare, named
 from wgsss.study.light_types import light_types, mean_irradiance
 
 SIZE = (32, 24)
@@ -102,15 +100,6 @@ def test_unknown_names():
         compare(lit(SUN), ["lambert"], "lambert", SIZE)
     with pytest.raises(InputError, match="unknown method 'lambrt'; did you mean 'lambert'"):
         compare(lit(SUN), ["lambrt"], size=SIZE)
-
-
-def test_footprint_counts_what_persists_once(gpu):
-    renderer = Renderer(lit(SUN), make_method("lambert"), SIZE)
-    graph = renderer.frame().graph
-    held = {id(h): h for p in graph.ran for h in p.imports.values()}
-    vertices = renderer.stage.bodies[0].vertices
-    assert id(vertices) in held and footprint(graph) > graph.peak_bytes + vertices.size
-    assert footprint(Graph(gpu)) == 0
 
 
 def test_mean_irradiance_in_closed_form():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import sys
 import time as clock
 from collections.abc import Sequence
@@ -13,12 +12,12 @@ import numpy.typing as npt
 
 from wgsss.errors import unknown
 from wgsss.gpu import default_gpu
-from wgsss.graph import Graph
 from wgsss.methods import METHODS, Method, make_method, name_of
 from wgsss.reference import REFERENCES, Estimate, Reference
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import Scene
 from wgsss.stage import Stage
+from wgsss.study.cost import frame_cost
 from wgsss.study.metrics import Errors, errors
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 WARM_FRAMES = 3
-"""frames that the time of one is the median of; the one before them pays for compilation"""
+"""frames that the time of one is the median of"""
 _AOVS = ("M_front", "M_back", "irradiance", "depth")
 
 
@@ -185,34 +184,14 @@ def _run(name: str, method: Method, scene: Scene, size: tuple[int, int], time: f
     start = clock.perf_counter()
     renderer = Renderer(scene, method, size)
     baked = clock.perf_counter()
-    image = renderer.frame(time, _AOVS)
-    frames = [renderer.frame(time) for _ in range(WARM_FRAMES)]
-    totals = [sum(frame.timings.values()) for frame in frames]
-    median = frames[totals.index(statistics.median_low(totals))]
+    image = renderer.frame(time, _AOVS, timed=False)
+    cost = frame_cost(renderer, time, WARM_FRAMES)
     return {
         "method": name_of(method),
         "knobs": dict(vars(method)),
         "bake_ms": 1000.0 * (baked - start),
-        "frame_ms": sum(median.timings.values()),
-        "passes": median.timings,
-        "bytes": footprint(median.graph),
+        "frame_ms": cost.frame_ms,
+        "passes": cost.passes,
+        "bytes": cost.bytes,
         "image": image,
     }
-
-
-def footprint(graph: Graph) -> int:
-    """Bytes of textures and buffers that a graph needed as it ran: what persists, and most transients live at once."""
-    persistent: dict[int, Any] = {}
-    for item in graph.ran:
-        indices = getattr(item.state, "indices", None)
-        persistent |= {id(held): held for held in (*item.imports.values(), indices) if held is not None}
-    return graph.peak_bytes + graph.uploaded_bytes + sum(_nbytes(held) for held in persistent.values())
-
-
-def _nbytes(held: Any) -> int:
-    from wgsss.gpu import texel_bytes
-
-    if not hasattr(held, "format"):
-        return int(held.size)
-    levels = [max(held.width >> i, 1) * max(held.height >> i, 1) for i in range(held.mip_level_count)]
-    return sum(levels) * held.depth_or_array_layers * texel_bytes(held.format)

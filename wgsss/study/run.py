@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import statistics
 import subprocess
 import threading
 import time
@@ -24,12 +23,13 @@ from wgsss.reference import Estimate
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import EnvironmentLight, Scene
 from wgsss.stage import Stage
-from wgsss.study.compare import footprint, make_reference, shown
+from wgsss.study.compare import make_reference, shown
+from wgsss.study.cost import frame_cost
 from wgsss.study.metrics import errors
 
 FRAMES_S = 2.0
-FEWEST, MOST = 5, 200
-"""frames that are timed: as many as fit FRAMES_S, within these limits"""
+FEWEST = 5
+"""frames that are timed: as many as fit FRAMES_S, and at least these"""
 
 _one_at_a_time = threading.Lock()  # a worker may have several threads, and what they run would slow each other
 
@@ -79,14 +79,7 @@ def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
     renderer = Renderer(scene, make_method(spec.method, spec.knobs), spec.size, gpu)
     bake_ms, bake_cached = 1e3 * (time.perf_counter() - start), _baked() <= known
     image = renderer.frame(aovs=("M_front", "M_back"), timed=False)  # the first frame pays for compilation
-    graph = renderer.frame().graph  # the second for textures that the pool does not have yet
-    frames: list[dict[str, float]] = []
-    began = time.perf_counter()
-    while len(frames) < FEWEST or (time.perf_counter() - began < FRAMES_S and len(frames) < MOST):
-        frames.append(renderer.frame().timings)
-    frames.sort(key=lambda passes: sum(passes.values()))
-    totals = [sum(passes.values()) for passes in frames]
-    low, middle, high = statistics.quantiles(totals, n=4, method="inclusive")
+    cost = frame_cost(renderer, 0.0, FEWEST, FRAMES_S)
     found = errors(
         image.aovs["M_front"] + image.aovs["M_back"],
         truth.M,
@@ -98,15 +91,15 @@ def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
     return {
         **spec.json(),
         "adapter": adapter(),
-        "clock": graph.clock,
+        "clock": cost.clock,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "bake_ms": bake_ms,
         "bake_cached": bake_cached,
-        "frame_ms": middle,
-        "frame_ms_quartiles": [low, high],
-        "frames": len(frames),
-        "passes": frames[len(frames) // 2],
-        "bytes": footprint(graph),
+        "frame_ms": cost.frame_ms,
+        "frame_ms_quartiles": list(cost.quartiles),
+        "frames": cost.frames,
+        "passes": cost.passes,
+        "bytes": cost.bytes,
         "error": {name: found[name] for name in ("rel_rmse", "psnr", "flip", "bias")},
         "floor": found["floor"],
     }
