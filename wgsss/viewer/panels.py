@@ -200,15 +200,15 @@ def _errors(window: Window) -> None:
     """How far each side is from the reference at this view, beside what it costs."""
     from imgui_bundle import imgui, implot
 
-    state, measured = window.state, window.measured
+    state, measured = window.state, window.painter.measured
     state.is_measured = imgui.checkbox("against the integral, in the background", state.is_measured)[1]
-    if window.truth.fault:
-        imgui.text_wrapped(window.truth.fault)
+    if window.painter.truth.fault:
+        imgui.text_wrapped(window.painter.truth.fault)
     if measured is None or not any(measured.errors):
         if state.is_measured:
-            imgui.text_disabled("refining" if window.truth.is_refining else "when nothing moves")
+            imgui.text_disabled("refining" if window.painter.truth.is_refining else "when nothing moves")
         return
-    imgui.text_disabled(f"reference at {window.truth.share:.3g} of the size")
+    imgui.text_disabled(f"reference at {window.painter.truth.share:.3g} of the size")
     dots = []
     for side, name, found in zip((0, 1), _SIDES, measured.errors, strict=True):
         if found is not None and found.rel_rmse is not None:
@@ -226,24 +226,24 @@ def _errors(window: Window) -> None:
 
 def milliseconds(window: Window, side: int) -> float:
     """That the passes of a side's picture took, shared ones among them."""
-    picture = window.sides[side]
-    if window.drawing is None or picture is None:
+    picture = window.painter.sides[side]
+    if window.painter.drawing is None or picture is None:
         return 0.0
-    return sum(window.drawing.graph.times.get(name, 0.0) for name in picture.passes)
+    return sum(window.painter.drawing.graph.times.get(name, 0.0) for name in picture.passes)
 
 
 def _passes(window: Window) -> None:
     """What the passes of the last picture cost, as bars."""
     from imgui_bundle import imgui
 
-    if window.drawing is None:
+    if window.painter.drawing is None:
         return
-    graph = window.drawing.graph
+    graph = window.painter.drawing.graph
     width, height = window.full_size
-    imgui.text_disabled(f"{window.seconds * 1e3:.0f} ms, {window.scale:.3g} of {width} x {height}")
+    imgui.text_disabled(f"{window.painter.seconds * 1e3:.0f} ms, {window.painter.scale:.3g} of {width} x {height}")
     imgui.text_disabled(graph.clock)
     most = max(graph.times.values(), default=1.0)
-    for side, (name, picture) in enumerate(zip(_SIDES, window.sides, strict=True)):
+    for side, (name, picture) in enumerate(zip(_SIDES, window.painter.sides, strict=True)):
         if picture is None:
             continue
         imgui.text(f"{name}: {milliseconds(window, side):.1f} ms")

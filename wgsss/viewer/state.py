@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.methods import Method, make_method, name_of
-from wgsss.scene import Scene, load_scene
+from wgsss.scene import Camera, Scene, load_scene
 from wgsss.scene.loading import with_material, with_view
 from wgsss.scene.scenefile import CAMERAS, LIGHTS
 
@@ -51,7 +51,7 @@ class State:
     is_measured: bool = False
     """whether a reference is estimated for the view, to tell errors"""
     notes: list[str] = field(default_factory=list)
-    """what went wrong, the last first"""
+    """what went wrong or was done, the last first"""
 
     @classmethod
     def open(
@@ -68,6 +68,16 @@ class State:
         if material is not None:
             state.wear(material)
         return state
+
+    @property
+    def camera(self) -> Camera:
+        """As it stands at the time shown."""
+        return self.scene.camera.at(self.time_s)
+
+    def note(self, text: str) -> None:
+        """Say something in the window: what went wrong, or was done."""
+        self.notes[:0] = [text]
+        del self.notes[8:]
 
     def wear(self, material: str | dict[str, Any]) -> None:
         """All objects of another material: a name, a file, or a table of one. Raises InputError where there is none."""
