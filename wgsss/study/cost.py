@@ -32,7 +32,7 @@ class Cost:
 
 
 def frame_cost(renderer: Renderer, time_s: float, fewest: int, seconds: float = 0.0) -> Cost:
-    """Time as many frames as fit `seconds`, and at least `fewest`. One, which compiles, should have been drawn before."""
+    """Time as many frames as fit `seconds`, at least `fewest`. One, which compiles, should have been drawn before."""
     graph = renderer.frame(time_s).graph  # it pays for textures that the pool does not have yet
     frames: list[dict[str, float]] = []
     began = time.perf_counter()
