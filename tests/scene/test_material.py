@@ -80,6 +80,10 @@ def test_user_material_has_the_profile_of_its_coefficients() -> None:
         ({"roughness": 0}, "roughness must be from 0.02 to 1, not 0"),
         ({"specular": 1.5}, "specular must be from 0 to 1"),
         ({"base_color": (1, 1, 2)}, "base_color must be three numbers, each from 0 to 1"),
+        ({"transport": (0.2, 4.0)}, "transport must be three numbers"),
+        ({"transport": (1.1, 4.0, 0.2)}, "transport must be a distortion up to 1, a power from 0.1"),
+        ({"transport": (0.2, 0.05, 0.2)}, "a power from 0.1 and an ambient up to 1"),
+        ({"transport": (0.2, 4.0, 1.1)}, "an ambient up to 1"),
         ({"color_after": "half"}, "color_after must be from 0 to 1, not 'half'"),
     ],
 )
@@ -87,6 +91,11 @@ def test_a_field_out_of_range_is_named(changes: dict, message: str) -> None:
     with pytest.raises(InputError, match=message) as raised:
         Material(**{**WAX, **changes})
     assert "\n" not in str(raised.value)
+
+
+def test_transport_at_its_limits() -> None:
+    for transport in ((0, 0.1, 0), (1, 64, 1)):
+        assert Material(**WAX, transport=transport).transport == transport
 
 
 @pytest.mark.parametrize(

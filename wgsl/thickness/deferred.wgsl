@@ -4,11 +4,12 @@ import package::mesh::{Surface};
 import package::light::{Light, incident};
 import package::irradiance::{transmitted_environment};
 import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
-import package::thickness::packing::{unpack_grey, unpack_coloured};
+import package::thickness::packing::{unpack_grey, unpack_coloured, unpack_low};
 import package::thickness::transport::{Transport, let_out, let_out_environment};
 import package::targets::{RGBA32Float};
 
 override COLOURED: bool = true;
+override BITS: u32 = 0u; // of each channel of the colour, which tell the parameters
 
 struct Params {
     clip_to_world: mat4x4f,
@@ -17,7 +18,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> transport: Transport;
+@group(0) @binding(1) var<storage, read> transports: array<Transport>; // that materials have
 @group(0) @binding(2) var<uniform> surface: Surface;
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 @group(0) @binding(4) var environment: texture_2d<f32>;
@@ -46,10 +47,14 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
     let n = normalize(textureLoad(normal, texel, 0).xyz);
     let w_o = direction_to_eye(params.eye, x);
-    var thickness = unpack_grey(textureLoad(stored, texel, 0));
+    let packed = textureLoad(stored, texel, 0);
+    var thickness = unpack_grey(packed, BITS);
+    var which = unpack_low(packed.b, BITS);
     if COLOURED {
-        thickness = unpack_coloured(textureLoad(stored, texel, 0));
+        thickness = unpack_coloured(packed, BITS);
+        which = unpack_low(packed.g, BITS) | unpack_low(packed.b, BITS) << BITS;
     }
+    let transport = transports[which];
     var light_out = let_out_environment(transport) * transmitted_environment(environment, linear_wrap_u, -n, 1.0);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let at = incident(lights[i], x);

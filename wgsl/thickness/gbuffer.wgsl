@@ -5,9 +5,11 @@ import package::thickness::packing::{pack_grey, pack_coloured};
 import package::targets::{RGBA8Unorm};
 
 override COLOURED: bool = true;
+override BITS: u32 = 0u; // of each channel of the colour, for `which`
 
 struct Params {
     world_to_clip: mat4x4f,
+    which: u32, // of the parameters that materials have
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -41,7 +43,7 @@ fn fs(in: Varying) -> Pixel {
         discard;
     }
     if COLOURED {
-        return Pixel(pack_coloured(in.thickness));
+        return Pixel(pack_coloured(in.thickness, params.which, BITS));
     }
-    return Pixel(pack_grey(in.thickness.g));
+    return Pixel(pack_grey(in.thickness.g, params.which, BITS));
 }

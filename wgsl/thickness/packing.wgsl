@@ -8,26 +8,46 @@
 // Sky visibility and environment maps are other effects' and left 0 here. The translucent material's ID is the last one,
 // so that blue fits above it. As the paper suggests, blue is scaled to what is left. Roots are stored, since equal steps
 // of thickness show where it is dark.
+//
+// Where materials of a frame differ in their parameters, the lowest bits of the colour, spared, tell which ones a pixel
+// has: one bit each of red and green, or two of grey.
 
 import package::units::{Number};
+import package::targets::{RGBA8Unorm};
 
 const TRANSLUCENT: Number = 3.0; // material ID
 const LEFT: Number = 252.0;      // of 255 steps, for blue
 
-fn pack_grey(thickness: Number) -> vec4f {
-    return vec4f(0.0, 0.0, sqrt(thickness), TRANSLUCENT / 255.0);
+// A channel whose lowest `bits` are `low`, above which is a number from 0 to 1.
+fn pack(number: Number, low: u32, bits: u32) -> Number {
+    return f32((u32(round(number * f32(255u >> bits))) << bits) | low) / 255.0;
 }
 
-fn unpack_grey(texel: vec4f) -> vec3f {
-    return vec3f(texel.b * texel.b);
+fn unpack(channel: Number, bits: u32) -> Number {
+    return f32(u32(round(255.0 * channel)) >> bits) / f32(255u >> bits);
 }
 
-fn pack_coloured(thickness: vec3f) -> vec4f {
+fn unpack_low(channel: Number, bits: u32) -> u32 {
+    return u32(round(255.0 * channel)) & ((1u << bits) - 1u);
+}
+
+fn pack_grey(thickness: Number, which: u32, bits: u32) -> RGBA8Unorm {
+    return vec4f(0.0, 0.0, pack(sqrt(thickness), which, bits), TRANSLUCENT / 255.0);
+}
+
+fn unpack_grey(texel: vec4f, bits: u32) -> vec3f {
+    let root = unpack(texel.b, bits);
+    return vec3f(root * root);
+}
+
+fn pack_coloured(thickness: vec3f, which: u32, bits: u32) -> RGBA8Unorm {
     let root = sqrt(thickness);
-    return vec4f(0.0, root.rg, (TRANSLUCENT + LEFT * root.b) / 255.0);
+    let red = pack(root.r, which & 1u, bits);
+    let green = pack(root.g, which >> 1u, bits);
+    return vec4f(0.0, red, green, (TRANSLUCENT + LEFT * root.b) / 255.0);
 }
 
-fn unpack_coloured(texel: vec4f) -> vec3f {
-    let root = vec3f(texel.gb, (255.0 * texel.a - TRANSLUCENT) / LEFT);
+fn unpack_coloured(texel: vec4f, bits: u32) -> vec3f {
+    let root = vec3f(unpack(texel.g, bits), unpack(texel.b, bits), (255.0 * texel.a - TRANSLUCENT) / LEFT);
     return root * root;
 }

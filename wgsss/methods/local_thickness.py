@@ -22,13 +22,16 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.thickness import local_thickness
-from wgsss.errors import unknown
+from wgsss.errors import InputError, unknown
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.stage import Body, Stage
 
 Array = npt.NDArray[Any]
+
+SETS = 4
+"""of parameters that a g-buffer has room for"""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,10 @@ class LocalThickness:
     1.12 and 1.08 of the integral's on the ear, 1.07 on the statue, 0.88 on the gyroid, 0.80 on the milk, 1.14 on the
     wave and 0.62 on the leaf. It changes with the view, as the integral's does not. A larger power, as the paper has,
     errs less where one looks towards the light and more elsewhere.
+
+    As in the paper, `distortion`, `power` and `ambient` are the material's, where it has them (its `transport`), and
+    `scale` tunes them all. A g-buffer tells up to SETS of them apart, by bits that colour spares: 7 bits of red and
+    green are left, or 6 of grey.
 
     An environment counts as light from straight behind: by scale + ambient of the irradiance that a surface
     facing away has. Nothing casts shadows, as in the paper, and what moves keeps its thickness at rest.
@@ -77,7 +84,12 @@ class LocalThickness:
                 raise unknown(knob.name, value, choices)
 
     def bake(self, stage: Stage) -> None:
-        """Measure the thickness of each mesh for its material."""
+        """Measure the thickness of each mesh for its material.
+
+        Raises InputError where a g-buffer is to tell more than SETS parameters of materials apart.
+        """
+        if self.stored == "g-buffer" and len(found := self._sets(stage)) > SETS:
+            raise InputError(f"a g-buffer has room for {SETS} materials' transport, not for {len(found)}")
         for body in stage.bodies:
             self.map(body)
 
@@ -94,13 +106,11 @@ class LocalThickness:
         return np.repeat((coloured @ weights)[:, None], 3, axis=1).astype(np.float32)
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:
-        draw = self._forward if self.stored == "vertices" else self._deferred
-        M_back: Any = None
-        for body in frame.stage.bodies:
-            thickness = self._upload(body)
-            if thickness is not None:
-                M_back = draw(frame, body, thickness, M_back)
-        return M_back
+        maps = {body: self._upload(body) for body in frame.stage.bodies}
+        shown = {body: thickness for body, thickness in maps.items() if thickness is not None}
+        if not shown:
+            return None
+        return self._forward(frame, shown) if self.stored == "vertices" else self._deferred(frame, shown)
 
     def _upload(self, body: Body) -> Any:
         """The map on the device; None where nothing comes through."""
@@ -112,51 +122,79 @@ class LocalThickness:
         key = ("local thickness map", id(body.rest.mesh), id(body.material), self.thickness)
         return body.stage.shared(key, make)
 
-    def _forward(self, frame: Frame, body: Body, thickness: Any, into: Handle | None) -> Handle:
-        return frame.graph.draw(
-            "thickness/forward",
-            into=into,
-            size=frame.size,
-            indices=body.indices,
-            constants={"MAPPED": body.material.maps.base_color is not None},
-            params={"world_to_clip": frame.view.world_to_clip, **_seen(frame, body)},
-            vertices=body.vertices,
-            thickness=thickness,
-            **self._lit(frame, body),
-        )
+    def _forward(self, frame: Frame, shown: dict[Body, Any]) -> Handle:
+        M_back: Any = None
+        for body, thickness in shown.items():
+            M_back = frame.graph.draw(
+                "thickness/forward",
+                into=M_back,
+                size=frame.size,
+                indices=body.indices,
+                constants={"MAPPED": body.material.maps.base_color is not None},
+                params={"world_to_clip": frame.view.world_to_clip, **_seen(frame, body)},
+                vertices=body.vertices,
+                thickness=thickness,
+                transport=self._transport(body),
+                **_lit(frame, body),
+            )
+        return M_back
 
-    def _deferred(self, frame: Frame, body: Body, thickness: Any, into: Handle | None) -> Handle:
-        coloured = {"COLOURED": self.thickness == "coloured"}
-        stored = frame.graph.draw(
-            "thickness/gbuffer",
-            size=frame.size,
-            indices=body.indices,
-            constants=coloured,
-            params={"world_to_clip": frame.view.world_to_clip},
-            surface=body.surface,
-            vertices=body.vertices,
-            thickness=thickness,
-            **frame.seen("depth"),
-        )
-        return frame.graph.draw(
-            "thickness/deferred",
-            into=into,
-            size=frame.size,
-            constants=coloured,
-            params={"clip_to_world": frame.view.clip_to_world, **_seen(frame, body)},
-            stored=stored,
-            **frame.seen("where_seen", "normal"),
-            **self._lit(frame, body),
-        )
+    def _deferred(self, frame: Frame, shown: dict[Body, Any]) -> Handle:
+        """All objects are drawn to one target, and lit from what it has."""
+        sets = self._sets(frame.stage)
+        coloured = self.thickness == "coloured"
+        constants = {"COLOURED": coloured, "BITS": 0 if len(sets) == 1 else 1 if coloured else 2}
+        stored: Any = None
+        for body, thickness in shown.items():
+            stored = frame.graph.draw(
+                "thickness/gbuffer",
+                into=stored,
+                size=frame.size,
+                indices=body.indices,
+                constants=constants,
+                params={"world_to_clip": frame.view.world_to_clip, "which": sets.index(self._transport(body))},
+                surface=body.surface,
+                vertices=body.vertices,
+                thickness=thickness,
+                **frame.seen("depth"),
+            )
+        M_back: Any = None
+        for body in shown:
+            M_back = frame.graph.draw(
+                "thickness/deferred",
+                into=M_back,
+                size=frame.size,
+                constants=constants,
+                params={"clip_to_world": frame.view.clip_to_world, **_seen(frame, body)},
+                transports=sets,
+                stored=stored,
+                **frame.seen("where_seen", "normal"),
+                **_lit(frame, body),
+            )
+        return M_back
 
-    def _lit(self, frame: Frame, body: Body) -> dict[str, Any]:
-        return {
-            "surface": body.surface,
-            "transport": {name: getattr(self, name) for name in ("distortion", "power", "scale", "ambient")},
-            "lights": frame.lighting.lights,
-            "environment": body.environment.irradiance,
-            **frame.seen("base_color", "depth"),
-        }
+    def _transport(self, body: Body) -> dict[str, float]:
+        """The parameters of a body: its material's own, or the knobs."""
+        names = ("distortion", "power", "ambient")
+        own = body.material.transport or tuple(getattr(self, name) for name in names)
+        return {**dict(zip(names, own, strict=True)), "scale": self.scale}
+
+    def _sets(self, stage: Stage) -> list[dict[str, float]]:
+        """The parameters that the bodies have, each once."""
+        found: list[dict[str, float]] = []
+        for body in stage.bodies:
+            if (transport := self._transport(body)) not in found:
+                found.append(transport)
+        return found
+
+
+def _lit(frame: Frame, body: Body) -> dict[str, Any]:
+    return {
+        "surface": body.surface,
+        "lights": frame.lighting.lights,
+        "environment": body.environment.irradiance,
+        **frame.seen("base_color", "depth"),
+    }
 
 
 def _seen(frame: Frame, body: Body) -> dict[str, Any]:

@@ -67,6 +67,8 @@ class Material:
     """linear; multiplies what the profile returns"""
     color_after: float = 1.0
     """share of the base colour applied after diffusion, col(x_o)^a col(x_i)^(1 - a) (Mikkelsen 2009, section 3.5)"""
+    transport: Triple | None = None
+    """distortion, power and ambient of light that has crossed the material, in place of barre11's knobs"""
     maps: Maps = field(default_factory=Maps)
 
     def __post_init__(self) -> None:
@@ -82,6 +84,11 @@ class Material:
         checks.number(self, "specular", 0, 1)
         checks.triple(self, "base_color", 0, 1)
         checks.number(self, "color_after", 0, 1)
+        if self.transport is not None:
+            checks.triple(self, "transport", 0, 64)
+            distortion, power, ambient = self.transport
+            if distortion > 1 or power < 0.1 or ambient > 1:
+                raise InputError("transport must be a distortion up to 1, a power from 0.1 and an ambient up to 1")
 
     def _check_medium(self) -> None:
         for name, kind in (("gaussians", SumOfGaussians), ("table", Tabulated)):
