@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -10,13 +11,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Object, OrthographicCamera, RectLight, Scene
+from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Object, OrthographicCamera, Scene
 from wgsss.scene.light import Light
 
 Array = npt.NDArray[np.float64]
 
 TURN = 180.0
 """degrees, across a height"""
+_POLE = np.array([0.0, 1.0, 0.0])
 STEEPEST = 88.0
 """degrees above and below the horizon that orbits reach"""
 
@@ -65,19 +67,22 @@ def turn_light(light: Light, camera: Camera, right: float, up: float, centre: An
     """A light moved over the sphere of directions about `centre`, as if the pointer turned that sphere."""
     if isinstance(light, EnvironmentLight):
         return replace(light, rotation=(light.rotation + TURN * right) % 360.0)
-    view = camera.view()
+    across, upright = camera.view()[:2, :3]
+    return _moved(light, centre, lambda v: _turned(_turned(v, upright, TURN * right), across, -TURN * up))
 
-    def moved(vector: Any) -> Any:
-        return _triple(
-            _turned(_turned(np.asarray(vector, np.float64), view[1, :3], TURN * right), view[0, :3], -TURN * up)
-        )
 
-    if isinstance(light, DirectionalLight):
-        return replace(light, direction=moved(light.direction))
-    place = _triple(np.asarray(centre) + moved(np.subtract(light.position, centre)))
-    if isinstance(light, RectLight):
-        return replace(light, position=place, direction=moved(light.direction), up=moved(light.up))
-    return replace(light, position=place)
+def bearing(light: Light, centre: Any) -> tuple[float, float]:
+    """Where a light shines from, seen from `centre`, as of `PerspectiveCamera.orbit`: azimuth, elevation, degrees."""
+    towards = _towards(light, centre)
+    x, y, z = towards / (np.linalg.norm(towards) or 1.0)
+    return math.degrees(math.atan2(x, z)), math.degrees(math.asin(np.clip(y, -1.0, 1.0)))
+
+
+def aim(light: Light, centre: Any, azimuth: float, elevation: float) -> Light:
+    """A light moved over the sphere about `centre`, as a body, to where it shines from such angles, degrees."""
+    around, above = bearing(light, centre)
+    side = np.array([math.cos(math.radians(around)), 0.0, -math.sin(math.radians(around))])
+    return _moved(light, centre, lambda v: _turned(_turned(v, side, above - elevation), _POLE, azimuth - around))
 
 
 def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
@@ -107,6 +112,23 @@ def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:
     """Where a point, world mm, is in the picture: -1 to 1 across and up."""
     clip = camera.projection(aspect, 1.0, 2.0) @ camera.view() @ np.append(point, 1.0)
     return float(clip[0] / clip[3]), float(clip[1] / clip[3])
+
+
+def _towards(light: Any, centre: Any) -> Array:
+    """From `centre` to a light."""
+    return -np.asarray(light.direction) if isinstance(light, DirectionalLight) else np.subtract(light.position, centre)
+
+
+def _moved(light: Any, centre: Any, turned: Callable[[Array], Array]) -> Any:
+    """A light with all that it has of places and directions turned about `centre`."""
+
+    def vector(value: Any) -> Any:
+        return _triple(turned(np.asarray(value, np.float64)))
+
+    found = {name: vector(getattr(light, name)) for name in ("direction", "up") if hasattr(light, name)}
+    if hasattr(light, "position"):
+        found["position"] = _triple(np.asarray(centre) + vector(np.subtract(light.position, centre)))
+    return replace(light, **found)
 
 
 def _turned(vector: Array, axis: Array, degrees: float) -> Array:

@@ -62,6 +62,7 @@ def _acts(window: Window) -> dict[str, Callable[[], Any]]:
         "e": entries,
         "r": state.reset,
         "f": lambda: pointer.focus(*pointer.at),
+        "p": window.ui.take_keys,
         "s": window.screenshot,
         "c": window.copy_command,
         "q": window.canvas.close,

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
 from wgsss.methods import Method
 from wgsss.viewer import keys, memory
@@ -18,6 +18,7 @@ from wgsss.viewer.painter import Painter
 from wgsss.viewer.panels import OPEN, PANEL_WIDTH, panels
 from wgsss.viewer.pointer import Pointer
 from wgsss.viewer.state import LEFT, RIGHT, Source, State
+from wgsss.viewer.trail import Trail
 
 SIZE = 960, 540
 """of the window, logical pixels, the first time"""
@@ -25,6 +26,13 @@ POLL_S = 0.2
 """between looks at how far a reference is"""
 WATCH_S = 0.5
 """between looks at the shaders' files"""
+AGAIN_S = 0.1
+"""until a frame is drawn again that the screen did not take"""
+SETTLING = 3
+"""frames after an event: the user interface takes a press and its release one by one, and shows next what they did"""
+LONGEST_S = 0.5
+"""of time that a frame may take: what is played does not skip what was not shown"""
+EVENTS = "pointer_down", "pointer_move", "pointer_up", "wheel", "key_down", "key_up", "char", "resize"
 
 
 def loop() -> Any:
@@ -40,35 +48,40 @@ class Window:
     def __init__(self, state: State, gpu: Gpu, size: tuple[int, int] | None = None) -> None:
         """`size` in logical pixels: by default what it was the last time."""
         import glfw
-        from imgui_bundle import implot
         from rendercanvas.glfw import RenderCanvas
-        from wgpu.utils.imgui import ImguiRenderer
+
+        from wgsss.viewer.ui import Ui
 
         self.state, self.gpu = state, gpu
-        self.painter = Painter(gpu)
+        self.painter, self.trail = Painter(gpu), Trail()
         remembered = memory.recall()
         self.open_panels = set(remembered.get("open", OPEN))
         self._size: tuple[float, float] = SIZE
-        self._clock = time.perf_counter()
+        self._clock: float | None = None
+        """when the last frame of what is played was drawn"""
+        self._due = 0
+        """frames to draw yet, whatever they show"""
+        self._is_lost = False
         size = size or tuple(remembered.get("size", SIZE))
         self.canvas = RenderCanvas(size=size, title=f"wgsss: {state.source.scene}", update_mode="ondemand")
-        self.ui = ImguiRenderer(gpu.device, self.canvas, "bgra8unorm")
-        implot.create_context()
+        self.ui = Ui(gpu.device, self.canvas, self._declare)
         self.gallery = Gallery(gpu, self.ui.backend)
-        self.ui.set_gui(self._declare)
         self.pointer = Pointer(self)
         self.canvas.add_event_handler(partial(keys.press, self), "key_down")
-        self.canvas.add_event_handler(lambda event: self.refresh(), "resize", "key_up", "char")
         on_drop: Any = lambda window, paths: self.drop(paths)  # noqa: E731
         glfw.set_drop_callback(self.canvas._window, on_drop)
         self.canvas.request_draw(self._draw)
 
     def run(self) -> None:
-        """Until the window is closed."""
+        """Until the window is closed. Raises RenderError where the device is lost."""
         self._watch()
-        loop().run()
-        self.painter.truth.close()
+        try:
+            loop().run()
+        finally:
+            self.painter.truth.close()
         memory.remember({"size": self._size, "open": sorted(self.open_panels)})
+        if self._is_lost:
+            raise RenderError(f"{self.gpu.name}: the device was lost; start the viewer again")
 
     def _watch(self) -> None:
         """Look after the shaders, again and again."""
@@ -76,23 +89,41 @@ class Window:
             self.refresh()
         loop().call_later(WATCH_S, self._watch)
 
-    def refresh(self) -> None:
+    def refresh(self, frames: int = 1) -> None:
         """Draw again soon."""
+        self._due = max(self._due, frames)
         self.canvas.request_draw()
 
     def _draw(self) -> None:
         state, now = self.state, time.perf_counter()
-        if state.playing:
-            state.time_s += now - self._clock
-        self._clock = now
+        self._due -= 1
+        if state.playing and self._clock is not None:
+            state.time_s += min(now - self._clock, LONGEST_S)
+        self._clock = now if state.playing else None
         self._size = self.canvas.get_logical_size()
         if self.painter.paint(state, self.full_size):
             self.gallery.hang(self.painter)
-        self.ui.render()
-        if state.playing or not self.painter.is_done(state, self.full_size):
+            self.trail.follow(state, self.painter, self.full_size)
+        self._present()
+        if state.playing or self._due > 0 or not self.painter.is_done(state, self.full_size):
             self.refresh()
         elif self.painter.truth.is_refining:
             loop().call_later(POLL_S, self.refresh)
+
+    def _present(self) -> None:
+        """Show pictures and panel. Raises what wgpu does where the surface is lost: it is there again the next time."""
+        import wgpu
+
+        try:
+            self.gpu.fence()  # says that the device is lost, where asking a surface for a texture would end the process
+            self.ui.render()
+        except wgpu.GPUError as error:
+            if "device is lost" in str(error):
+                self._is_lost = True
+                loop().call_soon(self.canvas.close)
+                raise wgpu.DrawCancelled from None
+            loop().call_later(AGAIN_S, self.refresh)
+            raise
 
     def _declare(self) -> None:
         self.gallery.declare(self)
@@ -156,24 +187,24 @@ class Window:
         self.state.methods[side] = method
         self.refresh()
 
-    def screenshot(self) -> list[Path]:
-        """Write what is shown of one side, PNG and EXR, as the command would."""
+    def screenshot(self, side: int | None = None) -> list[Path]:
+        """Write what is shown of a side, by default the one that keys are about, PNG and EXR, as the command would."""
         from wgsss.output import save
         from wgsss.rendering import AOVS, Renderer
 
         state = self.state
-        method = state.methods[self.side]
+        method = state.methods[self.side if side is None else side]
         image = Renderer(state.scene, method, self.full_size, self.gpu).frame(state.time_s, AOVS)
         stem = f"{Path(state.source.scene).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
         files = [path for suffix in (".png", ".exr") for path in save(image, Path(stem + suffix))]
         state.note(f"wrote {', '.join(map(str, files))}")
         return files
 
-    def copy_command(self) -> str:
-        """Put the command that draws a side on the clipboard."""
+    def copy_command(self, side: int | None = None) -> str:
+        """Put the command that draws a side, by default the one that keys are about, on the clipboard."""
         import glfw
 
-        command = self.state.command(self.side, self.full_size)
+        command = self.state.command(self.side if side is None else side, self.full_size)
         with suppress(glfw.GLFWError):
             glfw.set_clipboard_string(self.canvas._window, command)
         print(f"copied: {command}", flush=True)

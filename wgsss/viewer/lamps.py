@@ -1,0 +1,67 @@
+"""Controls for the first light: its type, its power, and where it shines from."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+from wgsss.scene import EnvironmentLight
+from wgsss.scene.light import Light
+from wgsss.scene.scenefile import LIGHTS
+from wgsss.study.light_types import light_types
+from wgsss.viewer import controls
+from wgsss.viewer.knobs import choice, shortened
+
+if TYPE_CHECKING:
+    from wgsss.viewer.window import Window
+
+
+def lamp(window: Window) -> None:
+    """Declare them. Lights other than the first stay as they are."""
+    from imgui_bundle import imgui
+
+    state = window.state
+    if not state.scene.lights:
+        imgui.text_disabled("none")
+        return
+    first, *others = state.scene.lights
+    shown = next(name for name, kind in LIGHTS.items() if kind is type(first))
+    chosen = choice("type", shown, dict.fromkeys([shown, *(name for name in LIGHTS if name != "sphere")]))
+    light: Any = first
+    if chosen != shown:  # one as bright, from behind and aside
+        offered = [scene.lights[0] for scene in light_types(state.scene, state.time_s).values()]
+        light = next(light for light in offered if type(light) is LIGHTS[chosen])
+    light = _aimed(_powered(light), state.scene.bounds.mean(axis=0))
+    if light is not first:
+        state.scene = replace(state.scene, lights=(light, *others))
+    imgui.text_disabled(f"the first of {len(others) + 1}; ctrl drag turns it")
+
+
+def _powered(light: Any) -> Any:
+    """With another strength, that of its strongest channel, or colour."""
+    from imgui_bundle import imgui
+
+    power = next(f.name for f in fields(light) if f.name in ("irradiance", "intensity", "radiance"))
+    value = getattr(light, power)
+    strength = max(*value, 1e-6)
+    changed, new = imgui.drag_float(power, strength, 0.01 * strength, 0.0, 1e9, "%.4g")
+    if changed and new > 0.0:
+        return replace(light, **{power: tuple(shortened(x * new / strength) for x in value)})
+    changed, tint = imgui.color_edit3("colour", [x / strength for x in value], imgui.ColorEditFlags_.float)
+    if changed and max(tint) > 0.0:
+        return replace(light, **{power: tuple(shortened(x * strength) for x in tint)})
+    return light
+
+
+def _aimed(light: Light, centre: Any) -> Light:
+    """From another side."""
+    from imgui_bundle import imgui
+
+    clamped = imgui.SliderFlags_.always_clamp
+    if isinstance(light, EnvironmentLight):
+        changed, rotation = imgui.slider_float("rotation", light.rotation, 0.0, 360.0, "%.1f deg", clamped)
+        return replace(light, rotation=shortened(rotation)) if changed else light
+    azimuth, elevation = controls.bearing(light, centre)
+    turned, azimuth = imgui.slider_float("azimuth", azimuth, -180.0, 180.0, "%.1f deg", clamped)
+    raised, elevation = imgui.slider_float("elevation", elevation, -90.0, 90.0, "%.1f deg", clamped)
+    return controls.aim(light, centre, azimuth, elevation) if turned or raised else light
