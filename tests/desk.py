@@ -80,8 +80,11 @@ class Desk:
 
 
 @contextmanager
-def desk(folder: Path, *argv: str) -> Iterator[Desk]:
-    """`wgsss view` with these arguments on a screen of its own; what it writes goes to the folder."""
+def desk(folder: Path, *argv: str, root: Path = ROOT, before: str = "") -> Iterator[Desk]:
+    """`wgsss view` with these arguments on a screen of its own; what it writes goes to the folder.
+
+    The program is that below `root`, and runs what is to be `before` it first.
+    """
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SCREEN[0]}x{SCREEN[1]}x24", "-nolisten", "tcp"]
     screen = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
@@ -89,12 +92,12 @@ def desk(folder: Path, *argv: str) -> Iterator[Desk]:
     with os.fdopen(read) as found:
         display = f":{found.readline().strip()}"
     output = folder / "said.txt"
-    env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(folder)}
+    env = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(root), "XDG_STATE_HOME": str(folder)}
     try:
         with output.open("w") as file:
-            program = subprocess.Popen(
-                [sys.executable, "-m", "wgsss", "view", *argv], cwd=folder, env=env, stdout=file, stderr=file, text=True
-            )
+            code = f"{before}\nfrom wgsss.cli import main\nraise SystemExit(main())"
+            started = [sys.executable, "-c", code, "view", *argv]
+            program = subprocess.Popen(started, cwd=folder, env=env, stdout=file, stderr=file, text=True)
         try:
             yield Desk(display, program, output)
         finally:

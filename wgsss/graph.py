@@ -43,7 +43,7 @@ class Graph:
         self.peak_bytes = 0
         self.uploaded_bytes = 0
         self._names: dict[str, int] = {}
-        self._held: list[Resource] = []  # what was wanted goes back to the pool with the graph
+        self._held: list[Resource] = []  # what is left of it goes back to the pool with the graph
         weakref.finalize(self, _release, gpu, self._held).atexit = False
 
     # declaring
@@ -258,7 +258,11 @@ class Graph:
                     self._allocate(handle.resource)
                     live += handle.resource.nbytes
             self.peak_bytes = max(self.peak_bytes, live)
-            encoder.encode(i, item, self._bind_group(item, arena, offsets))
+            try:
+                bound = self._bind_group(item, arena, offsets)
+            except wgpu.GPUValidationError as error:
+                raise WgslError(f"{item.name}: {item.module.explain(str(error))}") from None
+            encoder.encode(i, item, bound)
             for handle in {*item.reads.values(), *item.writes.values()}:
                 resource = handle.resource
                 if last_use[resource] == i and resource.gpu is not None and resource not in keep:
@@ -269,7 +273,6 @@ class Graph:
         self.times = encoder.times
         if arena is not None:
             self.gpu.release(arena_key, arena)
-        self._held += [r for r in keep if r.gpu is not None and r not in self._held]
 
     def read(self, handle: Handle) -> np.ndarray:
         """What a wanted handle holds after `run`: texels (height, width, channels), or a buffer's elements."""
@@ -289,6 +292,7 @@ class Graph:
         else:
             resource.key = TextureKey(resource.size, resource.format, resource.usage)
             resource.gpu = self.gpu.acquire(resource.key)
+        self._held.append(resource)
 
     def _upload(self) -> tuple[Any, Any, dict[tuple[Pass, str], int]]:
         """One buffer with all values that the kept passes were given, and the offset of each."""
@@ -365,7 +369,8 @@ class Graph:
 
 def _release(gpu: Gpu, resources: list[Resource]) -> None:
     for resource in resources:
-        gpu.release(resource.key, resource.gpu)
+        if resource.gpu is not None:
+            gpu.release(resource.key, resource.gpu)
 
 
 def _mismatch(module: Module, wanted: Mapping[str, Binding], given: Mapping[str, Any]) -> str:

@@ -128,6 +128,8 @@ def pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
 
 
 def _stage(gpu: Gpu, module: Module, stage: str, constants: dict[str, float]) -> dict[str, Any]:
+    if stage not in module.stages:
+        raise wgsl.WgslError(f"{module.name}: no @{stage} entry point")
     return {"module": gpu.shader(module), "entry_point": module.stages[stage], "constants": constants}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss.gpu import Gpu
@@ -16,12 +17,19 @@ from wgsss.viewer.state import ERROR, LEFT, RIGHT, SPLIT
 if TYPE_CHECKING:
     from wgsss.viewer.window import Window
 
+MARGIN, FONT_SIZE = 8.0, 13.0
+"""round a text and of it, logical pixels"""
+
 
 class Gallery:
     """What is shown beside the panel."""
 
     def __init__(self, gpu: Gpu, backend: Any) -> None:
+        import matplotlib
+
         self._sides = Sheet(gpu, backend), Sheet(gpu, backend)
+        fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+        self._mono = backend.io.fonts.add_font_from_file_ttf(str(fonts / "DejaVuSansMono.ttf"), FONT_SIZE)
         self._map, self._colours = Sheet(gpu, backend), Sheet(gpu, backend)
 
     def hang(self, painter: Painter) -> None:
@@ -51,6 +59,8 @@ class Gallery:
                 corners = (left + a * across, top), (left + b * across, top + down)
                 behind.add_image(sheet.reference, *corners, (a, 0.0), (b, 1.0))
 
+        if window.painter.fault:
+            self._say(imgui.get_foreground_draw_list(), window.painter.fault, window.region)
         if state.comparison == ERROR:
             add(self._map, 0.0, 1.0)
             self._legend(behind, window.region)
@@ -75,6 +85,19 @@ class Gallery:
         behind.add_image(self._colours.reference, (x, y), (x + length, y + 10))
         for share, text in error_maps.ticks(WHOLE):
             behind.add_text((x + share * length - 8, y + 14), imgui.IM_COL32(255, 255, 255, 255), text)
+
+    def _say(self, before: Any, text: str, region: tuple[float, float, float, float]) -> None:
+        """What went wrong, in front of the pictures, in a font in which compilers point at characters."""
+        from imgui_bundle import imgui
+
+        left, top, across, _ = region
+        wrap = across - 2 * MARGIN
+        imgui.push_font(self._mono, FONT_SIZE)
+        size = imgui.calc_text_size(text, wrap_width=wrap)
+        before.add_rect_filled((left, top), (left + across, top + size.y + 2 * MARGIN), imgui.IM_COL32(60, 0, 0, 220))
+        at, colour = (left + MARGIN, top + MARGIN), imgui.IM_COL32(255, 220, 220, 255)
+        before.add_text(self._mono, FONT_SIZE, at, colour, text, wrap_width=wrap)
+        imgui.pop_font()
 
 
 def _entries(behind: Any, window: Window) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 from typing import Any
 
 from wgsss.errors import InputError, RenderError
@@ -23,7 +24,7 @@ def _is_reference(method: Method) -> bool:
 
 
 class Painter:
-    """Keeps the pictures of both sides as the state has them. What goes wrong is noted there, and the last stay."""
+    """Keeps the pictures of both sides as the state has them; where that goes wrong, those that were there."""
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
@@ -37,6 +38,8 @@ class Painter:
         """share of the full size that the pictures have"""
         self.seconds = 0.0
         """that the last picture took"""
+        self.fault = ""
+        """what keeps the pictures from being those of the state and the shaders as they are"""
         self.present: list[Method] = []
         """the methods that the last drawing was asked of"""
         self._drawn: Any = None
@@ -57,6 +60,8 @@ class Painter:
 
     def paint(self, state: State, full: tuple[int, int]) -> bool:
         """Draw what is not drawn yet, at most at a size in pixels; whether there is something new."""
+        import wgpu
+
         view, now = _view(state, full), time.perf_counter()
         last = None if self._drawn is None else self._drawn[0]
         if view != last:
@@ -83,11 +88,18 @@ class Painter:
             self.sides = [None if m is None else next(pictures) for m in methods]
             self.scale = scale
             self.measured = None if moving else measure(self.drawing, self.sides, known)
-        except (InputError, RenderError, WgslError) as error:
-            state.note(str(error))
-            self.shaders.undo()
+        except Exception as error:  # shaders that are being written may break anything
+            if isinstance(error, InputError | RenderError | WgslError | wgpu.GPUError):
+                self.fault = str(error)
+            else:
+                self.fault = repr(error)
+                traceback.print_exc()
+            if self.shaders.undo():
+                self._drawn = None
             return False
         self.shaders.keep()
+        if not self.shaders.is_behind:
+            self.fault = ""
         self.seconds = time.perf_counter() - now
         if moving:
             self.pace.took(self.seconds)

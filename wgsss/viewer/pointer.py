@@ -89,4 +89,6 @@ class Pointer:
         left, top, across, down = self._window.region
         state = self._window.state
         right, up = 2 * (x - left) / across - 1, 1 - 2 * (y - top) / down
+        if max(abs(right), abs(up)) > 1.0:
+            return None
         return controls.pick(state.scene.at(state.time_s), across / down, right, up)

@@ -28,11 +28,8 @@ WATCH_S = 0.5
 """between looks at the shaders' files"""
 AGAIN_S = 0.1
 """until a frame is drawn again that the screen did not take"""
-SETTLING = 3
-"""frames after an event: the user interface takes a press and its release one by one, and shows next what they did"""
 LONGEST_S = 0.5
 """of time that a frame may take: what is played does not skip what was not shown"""
-EVENTS = "pointer_down", "pointer_move", "pointer_up", "wheel", "key_down", "key_up", "char", "resize"
 
 
 def loop() -> Any:
@@ -59,8 +56,6 @@ class Window:
         self._size: tuple[float, float] = SIZE
         self._clock: float | None = None
         """when the last frame of what is played was drawn"""
-        self._due = 0
-        """frames to draw yet, whatever they show"""
         self._is_lost = False
         size = size or tuple(remembered.get("size", SIZE))
         self.canvas = RenderCanvas(size=size, title=f"wgsss: {state.source.scene}", update_mode="ondemand")
@@ -89,14 +84,12 @@ class Window:
             self.refresh()
         loop().call_later(WATCH_S, self._watch)
 
-    def refresh(self, frames: int = 1) -> None:
+    def refresh(self) -> None:
         """Draw again soon."""
-        self._due = max(self._due, frames)
         self.canvas.request_draw()
 
     def _draw(self) -> None:
         state, now = self.state, time.perf_counter()
-        self._due -= 1
         if state.playing and self._clock is not None:
             state.time_s += min(now - self._clock, LONGEST_S)
         self._clock = now if state.playing else None
@@ -105,7 +98,7 @@ class Window:
             self.gallery.hang(self.painter)
             self.trail.follow(state, self.painter, self.full_size)
         self._present()
-        if state.playing or self._due > 0 or not self.painter.is_done(state, self.full_size):
+        if state.playing or not self.painter.is_done(state, self.full_size):
             self.refresh()
         elif self.painter.truth.is_refining:
             loop().call_later(POLL_S, self.refresh)
