@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from scenes import lit
 
+from wgsss.gpu import TextureKey
 from wgsss.methods import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, load_scene
@@ -16,10 +17,18 @@ from wgsss.scene import EnvironmentLight, load_scene
 
 def test_scenes_without_shadows_leave_no_textures_behind(gpu):
     scene = lit(EnvironmentLight((1, 1, 1)))
-    Renderer(scene, make_method("lambert"), (8, 8), gpu).frame()
-    before = len(gpu._views)
-    Renderer(scene, make_method("lambert"), (8, 8), gpu).frame()
-    assert len(gpu._views) == before
+    counts = []
+    for _ in range(3):
+        Renderer(scene, make_method("lambert"), (8, 8), gpu).frame()
+        counts.append(len(gpu._views))
+    assert counts[2] == counts[1]  # the first time there are those of other tests
+
+
+def test_frames_of_earlier_sizes_leave_no_textures_behind(gpu):
+    for width in (9, 10, 11):
+        Renderer(lit(EnvironmentLight((1, 1, 1))), make_method("lambert"), (width, 7), gpu).frame()
+        pooled = [key.size for key, free in gpu._free.items() if isinstance(key, TextureKey) and free]
+        assert {size[0] for size in pooled if size[1] == 7} == {width}
 
 
 def resident() -> int:

@@ -85,6 +85,7 @@ class Renderer:
         if not all(isinstance(n, int) and 1 <= n <= largest for n in size):
             raise InputError(f"the image size must be 1 to {largest} pixels a side, not {size[0]} x {size[1]}")
         self.gpu = gpu or default_gpu()
+        self.gpu.trim()  # or what frames of all earlier sizes, scenes and knobs needed would be kept
         self.method, self.size = method, size
         self.stage = Stage(self.gpu, scene)
         method.bake(self.stage)
