@@ -55,6 +55,11 @@ fn cube_face(d: vec3f) -> u32 {
     return select(5u, 4u, d.z > 0.0);
 }
 
+// The shadow view of a light, as a layer of the shadow maps, that sees along `d` from it.
+fn layer_towards(light: Light, d: vec3f) -> u32 {
+    return light.first_view + select(0u, cube_face(d), light.views == 6u);
+}
+
 // How far the receiver is lifted along its normal, in shadow texels per unit of sine: the filter below reaches 1.5
 // texels, over which a plane's depth rises by that many texels times the tangent. More would let light leak.
 const LIFT_TEXELS: Number = 2.0;

@@ -7,14 +7,22 @@ fn screen_corner(i: u32) -> vec4f {
     return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Where the surface is that `depth` was stored for, `pixel` being its centre.
-fn position_of_pixel(pixel: vec2f, depth: f32, size: vec2f, clip_to_world: mat4x4f) -> Position {
+// Where the surface is that a pixel shows, `pixel` being its centre.
+fn position_of_pixel(pixel: vec2f, depth: texture_depth_2d, clip_to_world: mat4x4f) -> Position {
+    let size = vec2f(textureDimensions(depth));
     let ndc = vec2f(2.0 * pixel.x / size.x - 1.0, 1.0 - 2.0 * pixel.y / size.y);
-    let x = clip_to_world * vec4f(ndc, depth, 1.0);
+    let x = clip_to_world * vec4f(ndc, textureLoad(depth, vec2u(pixel), 0), 1.0);
     return x.xyz / x.w;
 }
 
 // The direction to the viewer, from `eye` as the g-buffer has it.
 fn direction_to_eye(eye: vec4f, x: Position) -> Direction {
     return normalize(eye.xyz - x * eye.w);
+}
+
+const SAME: f32 = 1e-5; // depths that differ by less are of one surface
+
+// Whether what is at `place`, a pixel and its depth, lies behind what is seen there.
+fn is_hidden(place: vec4f, depth: texture_depth_2d) -> bool {
+    return place.z > textureLoad(depth, vec2u(place.xy), 0) + SAME;
 }

@@ -36,7 +36,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let cosine = max(dot(normalize(n_specular.xyz), direction_to_eye(params.eye, x)), 0.0);
     // A slot that a method leaves empty is a single black texel, loaded at its one place.

@@ -1,7 +1,7 @@
 // L_d at the pixels of one object.
 
 import package::mesh::{Surface};
-import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::screen::{screen_corner, position_of_pixel};
 import package::targets::{RGBA32Float};
@@ -39,7 +39,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(seen.z) != surface.id {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
     var total = transmitted_environment(environment, linear_wrap_u, n, seen.w);
@@ -51,7 +51,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         }
         var lit = 1.0;
         if light.views > 0u {
-            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            let layer = layer_towards(light, -at.direction);
             lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
         }
         total += transmitted(at, n, n_specular.w, lit, rho_dt_table);

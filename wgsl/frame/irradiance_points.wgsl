@@ -1,7 +1,7 @@
 // L_d at points on one object: its vertices, or any others. Normal maps, which need derivatives, are left out.
 
 import package::mesh::{Vertex, Surface, color_before};
-import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 
 @group(0) @binding(0) var<uniform> surface: Surface;
@@ -38,7 +38,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
         var lit = 1.0;
         if light.views > 0u {
-            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            let layer = layer_towards(light, -at.direction);
             lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
         }
         total += transmitted(at, n, specular, lit, rho_dt_table);

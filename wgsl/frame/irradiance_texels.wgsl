@@ -2,7 +2,7 @@
 
 import package::units::{Number};
 import package::mesh::{Vertex, Surface, bent_normal, color_before};
-import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::screen::{direction_to_eye};
 import package::targets::{RGBA16Float};
@@ -85,7 +85,7 @@ fn fs(in: Varying) -> Texel {
         }
         var lit = 1.0;
         if light.views > 0u {
-            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            let layer = layer_towards(light, -at.direction);
             lit = shadow(views[layer], layer, at, x, n, dx, dy, shadow_maps, compare_less);
         }
         irradiance += transmitted(at, n, specular, lit, rho_dt_table);

@@ -2,7 +2,7 @@
 
 import package::units::{Number};
 import package::mesh::{Surface};
-import package::light::{Light, ShadowView, incident, shadow, cube_face};
+import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::ggx::{ggx_brdf};
 import package::rho_dt::{rho_dt};
 import package::sampling::{lat_long_of_direction};
@@ -45,7 +45,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(seen.z) != surface.id {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
     let w_o = direction_to_eye(params.eye, x);
@@ -62,7 +62,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         }
         var lit = 1.0;
         if light.views > 0u {
-            let layer = light.first_view + select(0u, cube_face(-at.direction), light.views == 6u);
+            let layer = layer_towards(light, -at.direction);
             lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
         }
         total += at.irradiance * (f_r * dot(n, at.direction) * lit);

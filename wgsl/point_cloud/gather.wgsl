@@ -65,14 +65,13 @@ fn corner_of(i: u32) -> vec2u {
 // The four pixels from `first` on. Where the object is not seen, x_o is nowhere.
 fn four(first: vec2u) -> Four {
     let to_world = mat3x3f(surface.object_to_world[0].xyz, surface.object_to_world[1].xyz, surface.object_to_world[2].xyz);
-    let size = vec2f(textureDimensions(depth));
     var x: array<Position, 4>;
     var n: array<Direction, 4>;
     for (var i = 0u; i < 4u; i++) {
         let texel = first + corner_of(i);
         x[i] = vec3f(NOWHERE);
         if is_seen(texel) {
-            let at = position_of_pixel(vec2f(texel) + 0.5, textureLoad(depth, texel, 0), size, params.clip_to_world);
+            let at = position_of_pixel(vec2f(texel) + 0.5, depth, params.clip_to_world);
             x[i] = (at - surface.object_to_world[3].xyz) * to_world;
             n[i] = normalize(textureLoad(normal, texel, 0).xyz) * to_world;
         }

@@ -44,7 +44,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n = normalize(textureLoad(normal, texel, 0).xyz);
     let w_o = direction_to_eye(params.eye, x);
     let packed = textureLoad(stored, texel, 0);

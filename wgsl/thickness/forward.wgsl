@@ -3,7 +3,7 @@
 import package::mesh::{Vertex, Surface};
 import package::light::{Light, incident};
 import package::irradiance::{transmitted_environment};
-import package::screen::{direction_to_eye};
+import package::screen::{direction_to_eye, is_hidden};
 import package::thickness::transport::{Transport, let_out, let_out_environment};
 import package::targets::{RGBA32Float};
 
@@ -25,8 +25,6 @@ struct Params {
 @group(0) @binding(7) var linear_wrap_u: sampler;
 @group(0) @binding(8) var base_color: texture_2d<f32>;
 @group(0) @binding(9) var depth: texture_depth_2d;
-
-const SAME: f32 = 1e-5; // depths that differ by less are of one surface
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -53,12 +51,11 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 
 @fragment
 fn fs(in: Varying) -> Pixel {
-    let texel = vec2u(in.clip.xy);
-    if in.clip.z > textureLoad(depth, texel, 0) + SAME {
+    if is_hidden(in.clip, depth) {
         discard;
     }
     if MAPPED {
-        return Pixel(vec4f(in.M_back * textureLoad(base_color, texel, 0).rgb, 1.0));
+        return Pixel(vec4f(in.M_back * textureLoad(base_color, vec2u(in.clip.xy), 0).rgb, 1.0));
     }
     return Pixel(vec4f(in.M_back, 1.0));
 }

@@ -1,6 +1,7 @@
 // The target of a g-buffer of 8 bits a channel that holds one object's translucency.
 
 import package::mesh::{Vertex, Surface};
+import package::screen::{is_hidden};
 import package::thickness::packing::{pack_grey, pack_coloured};
 import package::targets::{RGBA8Unorm};
 
@@ -17,8 +18,6 @@ struct Params {
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
 @group(0) @binding(4) var depth: texture_depth_2d;
-
-const SAME: f32 = 1e-5; // depths that differ by less are of one surface
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -38,8 +37,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 
 @fragment
 fn fs(in: Varying) -> Pixel {
-    let texel = vec2u(in.clip.xy);
-    if in.clip.z > textureLoad(depth, texel, 0) + SAME {
+    if is_hidden(in.clip, depth) {
         discard;
     }
     if COLOURED {

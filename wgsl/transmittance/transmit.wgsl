@@ -3,7 +3,7 @@
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
 import package::mesh::{Surface};
-import package::light::{Light, ShadowView, Incident, incident, cube_face, POINT};
+import package::light::{Light, ShadowView, Incident, incident, layer_towards, POINT};
 import package::rho_dt::{rho_dt};
 import package::screen::{position_of_pixel};
 import package::rectangle::{rectangle_corner};
@@ -63,7 +63,7 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
     let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let shrink = SHRINK_TEXELS * texel * sine + params.shrink * sine * sine;
     let x = x_o - n * shrink;
-    let layer = light.first_view + select(0u, cube_face(x - light.position), light.views == 6u);
+    let layer = layer_towards(light, x - light.position);
     let to_clip = views[layer].world_to_clip;
     let clip = to_clip * vec4f(x, 1.0);
     // Along a ray a parallel view's depth grows evenly; a perspective one's is p + q / w, and w grows evenly.
@@ -103,7 +103,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let n = normalize(n_specular.xyz);
     var total = vec3f(0.0);

@@ -89,7 +89,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
-    let x_o = position_of_pixel(pixel.xy, textureLoad(depth, texel, 0), vec2f(textureDimensions(depth)), params.clip_to_world);
+    let x_o = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_o = normalize(textureLoad(normal, texel, 0).xyz);
     let w_i = normalize(params.light.xyz - x_o * params.light.w);
     let layer = select(0u, cube_face(-w_i), VIEWS == 6u);
