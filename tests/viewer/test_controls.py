@@ -93,3 +93,37 @@ def test_what_is_picked_is_what_is_projected_there(camera: Any) -> None:
     assert np.linalg.norm(point) == pytest.approx(radius, rel=0.01)
     assert np.subtract(camera.eye, point) @ point > 0.0, "the near side"
     assert controls.pick(scene, 1.5, 0.99, 0.99) is None
+
+
+LAMPS = [
+    DirectionalLight((0.3, -0.5, -1.0), (1.0, 1.0, 1.0)),
+    PointLight((10.0, 20.0, 30.0), (1.0, 1.0, 1.0)),
+    RectLight((0.0, 0.0, 50.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 10.0, 20.0, (1.0, 1.0, 1.0)),
+]
+CENTRE = 1.0, 2.0, 3.0
+
+
+@pytest.mark.parametrize("light", LAMPS)
+@pytest.mark.parametrize(("azimuth", "elevation"), [(30.0, -20.0), (-135.0, 60.0), (90.0, 0.0), (0.0, 90.0)])
+def test_a_light_is_aimed_where_a_camera_at_these_angles_would_be(light: Any, azimuth: float, elevation: float) -> None:
+    moved: Any = controls.aim(light, CENTRE, azimuth, elevation)
+    tilt = min(elevation, 89.999)
+    wanted = np.subtract(PerspectiveCamera.orbit(CENTRE, 1.0, azimuth, tilt).eye, CENTRE)
+    if isinstance(light, DirectionalLight):
+        arm, length = np.negative(moved.direction), np.linalg.norm(light.direction)
+    else:
+        arm, length = np.subtract(moved.position, CENTRE), np.linalg.norm(np.subtract(light.position, CENTRE))
+    np.testing.assert_allclose(arm / length, wanted, atol=1e-4)
+    if elevation < 90.0:
+        assert controls.bearing(moved, CENTRE) == pytest.approx((azimuth, elevation), abs=1e-9)
+    if isinstance(light, RectLight):  # it turns as a body
+        for name in ("direction", "up"):
+            before = np.dot(getattr(light, name), np.subtract(light.position, CENTRE))
+            assert np.dot(getattr(moved, name), np.subtract(moved.position, CENTRE)) == pytest.approx(before)
+
+
+def test_a_light_overhead_can_be_aimed_too() -> None:
+    above = DirectionalLight((0.0, -1.0, 0.0), (1.0, 1.0, 1.0))
+    assert controls.bearing(above, CENTRE)[1] == 90.0
+    moved: Any = controls.aim(above, CENTRE, 0.0, 30.0)
+    np.testing.assert_allclose(moved.direction, (0.0, -0.5, -math.sqrt(0.75)), atol=1e-12)

@@ -35,6 +35,9 @@ class Pair:
 
     parts: ClassVar[tuple[type[Method], type[Translucency]]]
 
+    def __post_init__(self) -> None:
+        self.made()  # the parts say what is wrong with their knobs
+
     def bake(self, stage: Stage) -> None:
         for part in self.made():
             part.bake(stage)
