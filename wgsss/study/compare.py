@@ -35,7 +35,7 @@ class Run:
     """One method: what it made, what that cost and how far it is from the reference."""
 
     name: str
-    """the method's, with its knobs where the method is there more than once"""
+    """the method's, with the knobs that tell it from others of that name"""
     method: str
     knobs: dict[str, Any]
     bake_ms: float
@@ -84,7 +84,7 @@ class Comparison:
         return found
 
     def _described(self, run: Run) -> dict[str, Any]:
-        own = {"scene": self.scene, "method": run.method, "knobs": run.knobs, "size": list(self.size)}
+        own = {"scene": self.scene, "name": run.name, "method": run.method, "knobs": run.knobs, "size": list(self.size)}
         cost = {"bake_ms": run.bake_ms, "frame_ms": run.frame_ms, "passes": run.passes, "bytes": run.bytes}
         return {**own, "adapter": self.adapter, **cost, "error": run.errors.json()}
 
@@ -170,13 +170,13 @@ def make_reference(name: str) -> Reference:
 
 
 def named(methods: Sequence[Method]) -> dict[str, Method]:
-    """Methods by their names, with the knobs where a name alone does not tell two apart. The same one twice is one."""
+    """Methods by their names, with the knobs that differ where a name is there twice. The same twice is one."""
     names = [name_of(method) for method in methods]
     found = {}
     for name, method in zip(names, methods, strict=True):
-        knobs = " ".join(f"{knob}={value}" for knob, value in vars(method).items())
-        twice = any(other == name and method != same for other, same in zip(names, methods, strict=True))
-        found[f"{name} {knobs}" if twice else name] = method
+        same = [vars(other) for other_name, other in zip(names, methods, strict=True) if other_name == name]
+        differ = [f"{knob}={v}" for knob, v in vars(method).items() if any(other[knob] != v for other in same)]
+        found[" ".join([name, *differ])] = method
     return found
 
 
