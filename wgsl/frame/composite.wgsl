@@ -3,12 +3,14 @@
 import package::units::{PI};
 import package::mesh::{Surface};
 import package::rho_dt::{rho_dt};
-import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
+import package::screen::{position_of_pixel, direction_to_eye};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
     eye: vec4f,
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -27,7 +29,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -3,11 +3,13 @@
 import package::mesh::{Surface};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
-import package::screen::{screen_corner, position_of_pixel};
+import package::screen::{position_of_pixel};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     clip_to_world: mat4x4f,
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -29,7 +31,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

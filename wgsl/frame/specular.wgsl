@@ -6,7 +6,8 @@ import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::ggx::{ggx_brdf};
 import package::rho_dt::{rho_dt};
 import package::sampling::{lat_long_of_direction};
-import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
+import package::screen::{position_of_pixel, direction_to_eye};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
@@ -14,6 +15,7 @@ struct Params {
     eye: vec4f,
     alpha: Number,
     eta: Number,
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -35,7 +37,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -1,11 +1,12 @@
 // M where light leaves at the point that it entered: the profile's total times L_d.
 
 import package::mesh::{Surface, color_before, color_after};
-import package::screen::{screen_corner};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
     total: vec3f, // of the diffusion profile
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -20,7 +21,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -3,9 +3,10 @@
 import package::mesh::{Surface};
 import package::light::{Light, incident};
 import package::irradiance::{transmitted_environment};
-import package::screen::{screen_corner, position_of_pixel, direction_to_eye};
+import package::screen::{position_of_pixel, direction_to_eye};
 import package::thickness::packing::{unpack_grey, unpack_coloured, unpack_low};
 import package::thickness::transport::{Transport, let_out, let_out_environment};
+import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 override COLOURED: bool = true;
@@ -15,6 +16,7 @@ struct Params {
     clip_to_world: mat4x4f,
     eye: vec4f,
     albedo: vec3f, // cDiffuseAlbedo, but for the base colour's map
+    rectangle: vec4f, // where the object may be
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -35,7 +37,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return screen_corner(i);
+    return rectangle_corner(i, params.rectangle);
 }
 
 @fragment

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from wgsss.bake.thickness import local_thickness
 from wgsss.errors import InputError, unknown
-from wgsss.frame import Frame
+from wgsss.frame import Frame, rectangle
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.stage import Body, Stage
@@ -164,8 +164,13 @@ class LocalThickness:
                 "thickness/deferred",
                 into=M_back,
                 size=frame.size,
+                count=6,
                 constants=constants,
-                params={"clip_to_world": frame.view.clip_to_world, **_seen(frame, body)},
+                params={
+                    "clip_to_world": frame.view.clip_to_world,
+                    "rectangle": rectangle(frame, body),
+                    **_seen(frame, body),
+                },
                 transports=sets,
                 stored=stored,
                 **frame.seen("where_seen", "normal"),

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from wgsss import frame as shared
 from wgsss import wgsl
 from wgsss.errors import InputError, unknown
-from wgsss.frame import Frame
+from wgsss.frame import Frame, rectangle
 from wgsss.gpu import Gpu
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
@@ -112,18 +112,6 @@ class ScreenSpace:
                     **frame.seen("base_color"),
                 )
         return M
-
-
-def rectangle(frame: Frame, body: Body) -> Array:
-    """Left, bottom, right and top in clip space of a rectangle that a body is in, and a pixel more on each side: what
-    is drawn and then discarded costs as much on CPUs as what is kept."""
-    posed = frame.stage.scene.objects[body.index]
-    corners = np.array(np.meshgrid(*posed.mesh.bounds.astype(np.float64).T, indexing="ij")).reshape(3, -1).T
-    clip = np.column_stack([corners, np.ones(8)]) @ posed.matrix.T @ frame.view.world_to_clip.T
-    if clip[:, 3].min() <= 0.0:  # the camera is beside it, or amid it
-        return np.array([-1.0, -1.0, 1.0, 1.0])
-    ndc, pixel = clip[:, :2] / clip[:, 3:], 2.0 / np.array(frame.size)
-    return np.clip(np.concatenate([ndc.min(axis=0) - pixel, ndc.max(axis=0) + pixel]), -1.0, 1.0)
 
 
 class Taps:

@@ -14,10 +14,9 @@ import numpy as np
 from wgsss import frame as shared
 from wgsss.bake.charts import Charts
 from wgsss.bake.charts import charts as make_charts
-from wgsss.frame import Frame
+from wgsss.frame import Frame, rectangle
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
-from wgsss.methods.screen_space import rectangle
 from wgsss.optics import SumOfGaussians, fit_shared_gaussians
 from wgsss.stage import Body, Stage
 

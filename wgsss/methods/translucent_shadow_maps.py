@@ -33,10 +33,9 @@ import numpy as np
 
 from wgsss.bake.environment import prefilter
 from wgsss.emitters import emitters
-from wgsss.frame import Frame
+from wgsss.frame import Frame, rectangle
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
-from wgsss.methods.screen_space import rectangle
 from wgsss.methods.texture_space import SLOTS, TextureSpace, by_slot
 from wgsss.scene import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
 from wgsss.stage import Body, Stage

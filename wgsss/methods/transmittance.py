@@ -31,10 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss import wgsl
-from wgsss.frame import Frame
+from wgsss.frame import Frame, rectangle
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
-from wgsss.methods.screen_space import ScreenSpace, rectangle
+from wgsss.methods.screen_space import ScreenSpace
 from wgsss.optics import Profile
 from wgsss.stage import Body, Stage
 
