@@ -18,12 +18,14 @@ from wgsss.scene import (
     EnvironmentLight,
     Mesh,
     Object,
+    OrthographicCamera,
     PerspectiveCamera,
     PointLight,
     RectLight,
     SphereLight,
 )
-from wgsss.scene.shapes import sphere
+from wgsss.scene.motion import BendAndSwell
+from wgsss.scene.shapes import capsule, sphere
 from wgsss.stage import Stage
 
 SIZE = 64
@@ -208,6 +210,37 @@ def test_a_scene_lit_by_its_environment_alone_has_no_shadow_pass(gpu):
     got = image(gpu, lit(EnvironmentLight((2, 2, 2))))
     assert not any("shadow" in p.name for p in got.graph.passes)
     assert any("shadow" in p.name for p in image(gpu, lit(DOWN)).graph.ran)
+
+
+def test_only_what_reflects_has_a_pass_for_that(gpu):
+    """Beside a matte ball a glossy one reflects what it does alone; where all is matte, nothing is drawn."""
+    ball = sphere(4.0, 600)
+    matte, glossy = Object(ball, MATTE, translate=(-5, 0, 0)), Object(ball, WHITE, translate=(5, 0, 0))
+    found, alone, none = (
+        image(gpu, replace(lit(DOWN), objects=objects)) for objects in ((matte, glossy), (glossy,), (matte,))
+    )
+    passes = [sum(item.module.name == "frame/specular" for item in got.graph.ran) for got in (found, alone, none)]
+    assert passes == [1, 1, 0]
+    np.testing.assert_allclose(found.aovs["specular"], alone.aovs["specular"], rtol=1e-3, atol=1e-4)
+    assert found.aovs["specular"].max() > 0.05 and not none.aovs["specular"].any()
+    for got in (found, none):
+        left = np.s_[:, : SIZE // 2, :3]
+        np.testing.assert_allclose(got.pixels[left], got.aovs["M_front"][left] / np.pi, rtol=1e-5)
+
+
+@pytest.mark.parametrize("amid", [False, True])
+def test_passes_leave_out_no_pixel_of_an_object(gpu, amid):
+    """They are drawn over rectangles: of an object as posed, and of the whole image where some is behind the camera."""
+    rod = Object(capsule(20.0, 2.0, 500), WHITE, motion=BendAndSwell(length=20.0, period_s=1.0), translate=(8, 0, 0))
+    pair, aside = (rod, replace(rod, translate=(-12, 0, 0))), OrthographicCamera((0, 10, 50), (0, 10, 0), height=40)
+    ground, within = (Object(plane(), WHITE),), PerspectiveCamera((0, 2, 0), (0, 0, -3), fov=90)
+    scene = lit(EnvironmentLight((1, 1, 1)), camera=within if amid else aside)
+    scene = replace(scene, objects=ground if amid else pair)
+    got = Renderer(scene, make_method("lambert"), (SIZE, SIZE), gpu).frame(0.25, AOVS)
+    seen = np.isfinite(got.aovs["depth"][..., 0])
+    assert 50 < seen.sum() < SIZE * SIZE
+    for values in (got.pixels, *(got.aovs[name] for name in ("irradiance", "M_front", "specular"))):
+        assert (values[seen] > 0).all() and not values[~seen].any()
 
 
 @pytest.mark.parametrize("gap", [0.3, 10.0])

@@ -234,14 +234,14 @@ def irradiance_points(frame: Frame, body: Body, points: Any, count: int) -> Hand
     )
 
 
-def specular(frame: Frame) -> Handle:
-    """Radiance reflected at the surface, W/(m^2 sr)."""
+def specular(frame: Frame) -> Handle | None:
+    """Radiance reflected at the surface, W/(m^2 sr); None where no material reflects any."""
     return frame.once("specular", lambda: _specular(frame))
 
 
-def _specular(frame: Frame) -> Handle:
+def _specular(frame: Frame) -> Handle | None:
     reflected: Any = None
-    for body in frame.stage.bodies:
+    for body in (body for body in frame.stage.bodies if body.material.specular > 0.0):
         params = {
             "clip_to_world": frame.view.clip_to_world,
             "eye": frame.view.eye,
@@ -262,7 +262,7 @@ def _specular(frame: Frame) -> Handle:
     return reflected
 
 
-def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: Handle) -> Handle:
+def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: Handle | None) -> Handle:
     """Radiance towards the viewer with coverage in alpha (Maisch & Ropinski 2017, eq. 5)."""
     radiance: Any = None
     for body in frame.stage.bodies:
@@ -280,7 +280,7 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
             rho_dt_table=frame.rho_dt_table(body),
             M_front=M_front,
             M_back=M_back or frame.stage.gpu.black,
-            specular=reflected,
+            specular=reflected or frame.stage.gpu.black,
             **frame.seen("where_seen", "normal", "depth"),
         )
     return radiance

@@ -112,7 +112,7 @@ def pipeline(gpu: Gpu, item: Pass) -> tuple[Any, Any]:
 
     def make() -> Any:
         fragment = None
-        if formats:
+        if "fragment" in module.stages:
             targets = [{"format": name} for name in formats]
             fragment = {**_stage(gpu, module, "fragment", constants), "targets": targets}
         return gpu.device.create_render_pipeline(

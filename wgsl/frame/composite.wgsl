@@ -41,9 +41,10 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
     let n_specular = textureLoad(normal, texel, 0);
     let cosine = max(dot(normalize(n_specular.xyz), direction_to_eye(params.eye, x)), 0.0);
-    // A slot that a method leaves empty is a single black texel, loaded at its one place.
+    // What nothing was drawn for is a single black texel, loaded at its one place.
     let back = textureLoad(M_back, min(texel, textureDimensions(M_back) - 1u), 0).rgb;
+    let reflected = textureLoad(specular, min(texel, textureDimensions(specular) - 1u), 0).rgb;
     let M = textureLoad(M_front, texel, 0).rgb + back;
     let diffuse = M * (rho_dt(rho_dt_table, cosine, n_specular.w) / PI);
-    return Pixel(vec4f(diffuse + textureLoad(specular, texel, 0).rgb, 1.0));
+    return Pixel(vec4f(diffuse + reflected, 1.0));
 }

@@ -3,7 +3,6 @@
 import package::charts::{INSIDE, Seam, across, settled};
 import package::mask::{BEHIND, covered_around};
 import package::screen::{screen_corner};
-import package::targets::{R32Float};
 
 @group(0) @binding(0) var source: texture_2d<f32>;
 @group(0) @binding(1) var ids: texture_2d<u32>;
@@ -11,7 +10,6 @@ import package::targets::{R32Float};
 @group(0) @binding(3) var linear_clamp: sampler;
 
 struct Texel {
-    @location(0) covered: R32Float,
     @builtin(frag_depth) mask: f32,
 }
 
@@ -30,5 +28,5 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
     }
     let here = textureSampleLevel(source, linear_clamp, home, 0.0).a;
     let covered = here + covered_around(source, linear_clamp, home, texel);
-    return Texel(covered, select(0.0, BEHIND, id != 0u && covered > 0.0));
+    return Texel(select(0.0, BEHIND, id != 0u && covered > 0.0));
 }

@@ -123,7 +123,7 @@ class TextureSpace:
         drawn = over("texture_space/dilate", self.map_size, depth_buffer="new", source=irradiance)
         blurred, masks = drawn.dilated, {self.map_size: drawn.depth}
         for size in {*sizes} - {self.map_size}:
-            masks[size] = over("texture_space/mask", size, label=str(size), depth_buffer="new", source=irradiance).depth
+            masks[size] = over("texture_space/mask", size, label=str(size), depth_buffer="new", source=irradiance)
         reached = 0.0
         found: list[Handle] = []
         for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, sizes, strict=True)):
