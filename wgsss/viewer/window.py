@@ -59,7 +59,7 @@ class Window:
         self._is_lost = False
         size = size or tuple(remembered.get("size", SIZE))
         self.canvas = RenderCanvas(size=size, title=f"wgsss: {state.source.scene}", update_mode="ondemand")
-        self.ui = Ui(gpu.device, self.canvas, self._declare)
+        self.ui = Ui(gpu.device, self.canvas, self._declare, lambda: self.region[0])
         self.gallery = Gallery(gpu, self.ui.backend)
         self.pointer = Pointer(self)
         self.canvas.add_event_handler(partial(keys.press, self), "key_down")
