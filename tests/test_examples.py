@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import shlex
@@ -90,6 +91,26 @@ def test_sam_bake_times(script: Callable[..., list[list[str]]], tmp_path: Path) 
     assert all(float(row[4]) > 0 and row[-1] == "48" for row in rows[1:3])
     with Picture.open(chart) as picture:
         assert np.asarray(picture).std() > 10
+
+
+def test_light_types(script: Callable[..., list[list[str]]], tmp_path: Path) -> None:
+    def run(name: str, share: float) -> dict:
+        return {"name": name, "error": {"rel_rmse": share, "floor": 0.01}}
+
+    lights = {"sun": [run("a", 0.5), run("b", 0.25)], "sky": [run("a", 1.25), run("b", 0.125)]}
+    found = {"scene": "ear", "reference": "integral", "methods": [run("a", 0.75), run("b", 0.0625)], "lights": lights}
+    (tmp_path / "metrics.json").write_text(json.dumps(found))
+    table = runpy.run_path(str(EXAMPLES / "light_types.py"))["read"](tmp_path)
+    assert table[:3] == ("ear", ["a", "b", "(integral)"], ["own", "sun", "sky"])
+    np.testing.assert_array_equal(table.errors, [[75, 50, 125], [6.25, 25, 12.5], [1, 1, 1]])
+
+    script("light_types", str(tmp_path), "-o", str(tmp_path / "a.png"))
+    with Picture.open(tmp_path / "a.png") as picture:
+        assert np.asarray(picture).std() > 10
+    del found["lights"]
+    (tmp_path / "metrics.json").write_text(json.dumps(found))
+    with pytest.raises(SystemExit, match="without --lights all"):
+        script("light_types", str(tmp_path))
 
 
 def test_screen_space_angles(script: Callable[..., list[list[str]]], tmp_path: Path) -> None:
