@@ -73,6 +73,23 @@ def test_edge_at_an_angle_to_the_blurs(gpu, angle):
     assert edge_error(gpu, plane(cells=4), 1024, angle=angle) < 0.01
 
 
+def test_edge_by_gaussians_to_their_ends(gpu):
+    """Cut off at two sigmas instead of three, and normalised, it would be off by 0.02."""
+    for variances in ([4.0], [1.0, 4.0]):
+        weights = np.eye(len(variances))[-1][:, None] * [0.9, 0.5, 0.1]
+        wax = replace(MATTE, gaussians=SumOfGaussians(np.array(variances), weights))
+        assert edge_error(gpu, plane(cells=4), 512, wax) < 0.007
+
+
+def test_edge_where_the_directions_of_a_blur_are_undefined(gpu):
+    """The surface faces the axis that they turn about, but for bumps of 0.01 mm: they are any. With other axes for
+    other Gaussians that is so for a third of them; with one for all it would be off by 0.035."""
+    flat = plane(cells=40)
+    bumps = np.random.default_rng(1).normal(0.0, 0.01, len(flat.positions))[:, None] * [0, 1, 0]
+    bumpy = replace(flat, positions=(flat.positions + bumps).astype(np.float32))
+    assert edge_error(gpu, bumpy, 512) < 0.025
+
+
 def test_edge_on_skin(gpu):
     """Its narrowest Gaussian has a sigma of 0.08 mm, two texels here; on coarser maps blue errs by more."""
     assert edge_error(gpu, plane(cells=4), 1024, SKIN) < 0.015
