@@ -97,5 +97,5 @@ def test_a_pair_is_swept_over_the_settings_of_both() -> None:
         (17, 3),
         (33, 3),
         (65, 3),
-        (17, 8),
+        (0, 8),
     ]

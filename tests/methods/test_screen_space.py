@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.graph import Graph
 from wgsss.methods import Lambert
-from wgsss.methods.screen_space import ScreenSpace, Taps, place
+from wgsss.methods.screen_space import ScreenSpace, Taps, taps_for
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.separable import line_spread
 from wgsss.rendering import Renderer
@@ -85,18 +86,24 @@ def turned(degrees: float, pixels_per_mm: float, size: int) -> OrthographicCamer
 @pytest.mark.parametrize("degrees", [0, 90])
 def test_edge_along_a_pass(gpu, pixels_per_mm, most, degrees):
     camera = turned(degrees, pixels_per_mm, 128)
-    assert edge_error(gpu, camera, ScreenSpace()).max() < most
+    assert edge_error(gpu, camera, ScreenSpace(taps=17)).max() < most
 
 
 def test_edge_with_more_taps(gpu):
     assert edge_error(gpu, turned(0, 8, 128), ScreenSpace(taps=33)).max() < 0.012
 
 
-@pytest.mark.parametrize(("degrees", "line"), [(0, 0.022), (22.5, 0.062), (45, 0.074)])
+@pytest.mark.parametrize("degrees", [0, 11.25, 22.5, 33.75, 45])
+def test_edge_at_any_angle_to_the_passes_by_two_products(gpu, degrees):
+    """Red, which has the largest share of what is wide."""
+    camera = turned(degrees, 8, 192)
+    assert edge_error(gpu, camera, ScreenSpace(taps=17, kernel="svd"), 192)[0] < 0.02
+
+
+@pytest.mark.parametrize(("degrees", "line"), [(22.5, 0.062), (45, 0.074)])
 def test_edge_at_an_angle_to_the_passes(gpu, degrees, line):
     camera = turned(degrees, 8, 192)
-    assert edge_error(gpu, camera, ScreenSpace(kernel="svd"), 192)[0] < 0.02 + (degrees == 0) * 0.005
-    assert edge_error(gpu, camera, ScreenSpace(), 192)[0] == pytest.approx(line, abs=0.006)
+    assert edge_error(gpu, camera, ScreenSpace(taps=17), 192)[0] == pytest.approx(line, abs=0.006)
 
 
 @pytest.mark.parametrize("pixels_per_mm", [2, 8])
@@ -241,21 +248,66 @@ def test_the_base_colour_may_be_applied_before_or_after(gpu):
     assert np.abs(np.diff(sides[0.0][:, 1])).max() < 0.1 * lit_side[1]
 
 
-@pytest.mark.parametrize("count", [5, 17, 65])
+@pytest.mark.parametrize("count", [1, 5, 17, 65])
 def test_taps(count):
-    """What a level's taps weigh is the kernel, each pixel is read by one of them, and their cost is their number."""
+    """What a level's taps weigh is the kernel, and their cost is their number."""
     (term,) = line_spread(SKIN_GAUSSIANS)
     taps = Taps(term, term, count // 2)
     levels = len(taps.pixels_per_mm)
     assert taps.offset.shape == (levels, 1 + count // 2) and taps.weight.shape == (levels, 1 + count // 2, 3)
     np.testing.assert_allclose(taps.weight[:, 0] + 2 * taps.weight[:, 1:].sum(axis=1), 1.0, rtol=1e-6)
     assert (taps.weight > -1e-9).all()
-    edges, offset = place(term, taps.pixels_per_mm, count // 2)
-    assert (
-        (np.diff(edges) >= 1).all() and (offset[:, 1:] > edges[:, :-1]).all() and (offset[:, 1:] < edges[:, 1:]).all()
-    )
+    assert (taps.offset[:, 0] == 0).all() and (np.diff(taps.offset, axis=1) >= 1).all()
     np.testing.assert_allclose(taps.weight[0], np.eye(1 + count // 2)[:, :1] @ np.ones((1, 3)), atol=1e-6)
     assert (np.abs(taps.pixels_per_mm[1:] / taps.pixels_per_mm[:-1] - 1) < 0.022).all()
+
+
+@pytest.mark.parametrize("level", [150, 200, 230])
+def test_no_other_pixels_are_as_true_to_an_edge(level):
+    """Of all threes of pixels, with a value between each two of them that no other is better than."""
+    (term,) = line_spread(SKIN_GAUSSIANS)
+    taps = Taps(term, term, 3)
+    edges = np.arange(0.5, 40)
+    light = np.stack([np.interp(edges / taps.pixels_per_mm[level], term.x, column) for column in term.within.T], axis=1)
+
+    def error(offset):
+        between = np.split(light, [round(tap) for tap in offset])
+        return max(
+            *(0.5 * np.ptp(part, axis=0).max() for part in between[:-1] if len(part)), (1 - between[-1][0]).max()
+        )
+
+    best = min(error(offset) for offset in combinations(range(1, 40), 3))
+    assert error(taps.offset[level, 1:]) == pytest.approx(best, abs=2e-4) and best > 0.01
+    read = taps.weight[level, 0] + 2 * np.concatenate([np.zeros((1, 3)), np.cumsum(taps.weight[level, 1:], axis=0)])
+    reached = np.searchsorted(taps.offset[level, 1:], edges)
+    assert np.abs(read[reached] - light).max() == pytest.approx(best, abs=2e-4)
+
+
+@pytest.mark.parametrize("size", [64, 256])
+def test_taps_are_as_dense_as_the_blur_asks_for(gpu, size):
+    """Half of a Gaussian's light leaves within sqrt(2 v ln 2)."""
+    below = replace(ABOVE, height=20)
+    beside = PerspectiveCamera((30, 10, 0), (0, 10, 0), fov=40)
+    scale = {below: size / 20, beside: size / (2 * 30 * np.tan(np.radians(20)))}
+    for camera, pixels_per_mm in scale.items():
+        for pixels, taps in ((1.0, 17), (7.9, 17), (8.1, 33), (15.9, 33), (16.1, 65), (500.0, 65)):
+            v = (pixels / pixels_per_mm) ** 2 / (2 * np.log(2))
+            material = replace(MATTE, gaussians=SumOfGaussians(np.array([v]), np.array([[0.9, 0.5, 0.1]])))
+            finger = Object(capsule(length=20.0, radius=2.0, vertices=100), material)
+            stage = Stage(gpu, replace(lit(DOWN, camera=camera), objects=(finger,)))
+            frame = shared.begin(Graph(gpu), stage, (size, size))
+            assert taps_for(frame, stage.bodies[0]) == taps
+
+
+def test_every_object_has_taps_of_its_own_unless_told(gpu):
+    wide = replace(MATTE, gaussians=SumOfGaussians(np.array([200.0]), np.array([[0.9, 0.5, 0.1]])))
+    near, far = (replace(plane(side=20.0), name=name) for name in ("near", "far"))
+    scene = lit(DOWN, mesh=near, material=SKIN, camera=ABOVE, extra=(Object(far, wide, translate=(0, -3, 0)),))
+    for method, expected in ((ScreenSpace(), (17, 65)), (ScreenSpace(taps=9), (9, 9))):
+        graph = Renderer(scene, method, (64, 64), gpu).frame(timed=False).graph
+        blurs = [item for item in graph.passes if item.module.name == "screen_space/blur"]
+        levels, size = 448, 16
+        assert [item.imports["taps"].size // (levels * size) * 2 - 1 for item in blurs[::2]] == list(expected)
 
 
 def test_taps_of_a_black_material():

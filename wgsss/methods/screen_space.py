@@ -5,8 +5,9 @@ material whose reach in pixels follows the surface's distance and slope. Unlike 
 kernel is not scaled by taste: it has the profile's total and, along the directions of the blurs, its response to edges.
 
 A tap reads one pixel for all that it stands for. Where a kernel spans hundreds of pixels, as milk's does on a large
-picture, edges of light and of what is in front come out as faint copies, a tap apart: 33 taps leave a few of them, 65
-next to none.
+picture, edges of light and of what is in front come out as faint copies, a tap apart. So an object has 17 taps a
+direction only where half of the light leaves within 8 pixels, 33 within 16, and beyond that 65, which leave next to
+none.
 """
 
 from __future__ import annotations
@@ -29,12 +30,21 @@ from wgsss.stage import Body, Stage
 
 Array = NDArray[np.float64]
 
+_HALVINGS = 16  # of the search for where taps are placed
+
 
 @dataclass(frozen=True)
 class ScreenSpace:
     """M_front as a separable kernel over the pixels of each object; M_back is not estimated."""
 
-    taps: int = field(default=17, metadata={"unit": "", "range": (5, 65), "help": "lookups per direction, odd"})
+    taps: int = field(
+        default=0,
+        metadata={
+            "unit": "",
+            "range": (0, 65),
+            "help": "lookups per direction, odd; 0: by the light's reach in pixels",
+        },
+    )
     kernel: str = field(
         default="line-spread",
         metadata={"unit": "", "choices": tuple(KERNELS), "help": "how a profile becomes two passes"},
@@ -44,25 +54,26 @@ class ScreenSpace:
     sweep: ClassVar[tuple[dict[str, Any], ...]] = tuple({"taps": n} for n in (9, 17, 33, 65))
 
     def __post_init__(self) -> None:
-        if self.taps % 2 == 0:
-            raise InputError(f"taps must be odd, not {self.taps}")
+        if self.taps and self.taps % 2 == 0:
+            raise InputError(f"taps must be odd or 0, not {self.taps}")
         if self.kernel not in KERNELS:
             raise unknown("kernel", self.kernel, tuple(KERNELS))
 
     def bake(self, stage: Stage) -> None:
-        """The taps of each material's kernel."""
-        for body in stage.bodies:
-            self.weights(body)
+        """The taps of each material's kernel, unless the image decides on them."""
+        if self.taps:
+            for body in stage.bodies:
+                self.weights(body, self.taps)
 
-    def weights(self, body: Body) -> list[tuple[Taps, Any]]:
-        """The kernel of a body's material, a term and its buffer for each pair of passes."""
+    def weights(self, body: Body, taps: int) -> list[tuple[Taps, Any]]:
+        """The kernel of a body's material by so many taps, a term and its buffer for each pair of passes."""
 
         def make() -> list[tuple[Taps, Any]]:
             terms = KERNELS[self.kernel](body.material.profile)
-            taps = [Taps(term, terms[0], self.taps // 2) for term in terms]
-            return [(t, t.upload(body.stage.gpu)) for t in taps]
+            found = [Taps(term, terms[0], taps // 2) for term in terms]
+            return [(t, t.upload(body.stage.gpu)) for t in found]
 
-        return body.stage.shared(("separable", id(body.material), self.kernel, self.taps), make)
+        return body.stage.shared(("separable", id(body.material), self.kernel, taps), make)
 
     def passes(self, frame: Frame) -> Diffused:
         return Diffused(frame.once(self, lambda: self._M_front(frame)))
@@ -87,7 +98,7 @@ class ScreenSpace:
             irradiance=irradiance,
             **frame.seen("where_seen", "normal", "base_color", "depth"),
         )
-        terms = self.weights(body)
+        terms = self.weights(body, self.taps or taps_for(frame, body))
         M: Any = frame.stage.gpu.black
         for i, (taps, buffer) in enumerate(terms):
             before, M = M, entered.entering
@@ -114,8 +125,19 @@ class ScreenSpace:
         return M
 
 
+def taps_for(frame: Frame, body: Body) -> int:
+    """Taps as dense as what they blur asks for: to a side as many as half of the light spreads pixels, up to 32."""
+    half = body.stage.shared(("half", id(body.material)), lambda: float(body.material.profile.range(0.5).max()))
+    posed = frame.stage.scene.objects[body.index]
+    middle = posed.matrix @ np.array([*posed.mesh.bounds.mean(axis=0), 1.0])
+    to_clip = frame.view.world_to_clip
+    # Of what the camera is amid, the middle may lie behind it.
+    pixels_per_mm = 0.5 * frame.size[1] * np.linalg.norm(to_clip[1, :3]) / max(to_clip[3] @ middle, 1e-6)
+    return next((taps for taps in (17, 33) if taps // 2 >= half * pixels_per_mm), 65)
+
+
 class Taps:
-    """A term of a kernel as weights of whole pixels, for any number of pixels per mm.
+    """A term of a kernel as weights of single pixels, for any number of pixels per mm.
 
     Attributes:
         weight: (levels, 1 + sides, 3) of each of the two pixels that a tap reads, the one in the middle first. The
@@ -129,9 +151,13 @@ class Taps:
         known = wgsl.load("screen_space/blur").constants
         levels = np.arange(known["LEVELS"]) / known["LEVELS_PER_OCTAVE"]
         self.pixels_per_mm = 0.5 / term.x[-1] * 2.0**levels
-        edges, self.offset = place(placed_by, self.pixels_per_mm, sides)
-        within = [np.interp(edges / self.pixels_per_mm[:, None], term.x, column) for column in term.within.T]
-        self.weight = np.diff(np.stack(within, axis=-1), axis=1, prepend=0.0)
+        self.offset = place(placed_by, self.pixels_per_mm, sides)
+        # An edge lies between two pixels. Wherever it is between one tap and the next, what is read of it is the same:
+        # the mean of what it should be next to the one tap and next to the other.
+        first, last = self.offset + 0.5, np.full_like(self.offset, np.inf)
+        last[:, :-1], first[:, -1] = self.offset[:, 1:] - 0.5, np.inf
+        read = 0.5 * (_within(term, first, self.pixels_per_mm) + _within(term, last, self.pixels_per_mm))
+        self.weight = np.diff(read, axis=1, prepend=0.0)
         self.weight[:, 1:] *= 0.5
         self.scale = term.scale
 
@@ -141,28 +167,33 @@ class Taps:
         return gpu.buffer(wgsl.load("screen_space/blur").layout("array<Tap>").pack(value))
 
 
-def place(term: Term, pixels_per_mm: Array, sides: int) -> tuple[Array, Array]:
-    """Which pixels `sides` taps to either side stand for, at each number of pixels per mm (L,).
+def place(term: Term, pixels_per_mm: Array, sides: int) -> Array:
+    """The pixels (L, 1 + sides), from the middle on, that taps read at each number of pixels per mm (L,).
 
-    All are edges between pixels: a step in the irradiance is one as well. The pixel in the middle has a tap of its
-    own; of what is beyond, each tap has an equal share, of the widest channel at each distance, or a single pixel.
-
-    Returns:
-        edges: (L, 1 + sides) pixels from the middle to where each tap ends; the last are at the kernel's range.
-        offset: (L, 1 + sides) the pixel that each tap is read at: it halves the tap's share.
+    As far apart as leaves the least of the term, in the channel that has most, between one and the next, and half of
+    that beyond the last: no others are as true to an edge wherever it is.
     """
-    densest = np.diff(term.within, axis=0).max(axis=1)
-    share = np.concatenate([[0.0], np.cumsum(densest)]) / densest.sum()
-    kept = np.concatenate([[True], np.diff(share) > 0.0])
-    x, share = term.x[kept], share[kept]
-    reach = np.ceil(term.x[-1] * pixels_per_mm - 0.5) + 0.5
-    edges, offsets = [np.full(pixels_per_mm.shape, 0.5)], [np.zeros(pixels_per_mm.shape)]
-    for left in range(sides, 0, -1):
-        start = edges[-1]
-        done = np.interp(start / pixels_per_mm, x, share)
-        end = np.round(np.interp(done + (1.0 - done) / left, share, x) * pixels_per_mm - 0.5) + 0.5
-        end = np.maximum(end if left > 1 else reach, start + 1.0)
-        half = 0.5 * (done + np.interp(end / pixels_per_mm, x, share))
-        offsets.append(np.clip(np.round(np.interp(half, share, x) * pixels_per_mm), start + 0.5, end - 0.5))
-        edges.append(end)
-    return np.stack(edges, axis=1), np.stack(offsets, axis=1)
+    least, most = np.zeros(pixels_per_mm.shape), np.full(pixels_per_mm.shape, 2.0)
+    for _ in range(_HALVINGS):
+        between = 0.5 * (least + most)
+        enough = _placed(term, pixels_per_mm, sides, between)[:, 0] <= 0.0
+        least, most = np.where(enough, least, between), np.where(enough, between, most)
+    return np.maximum(_placed(term, pixels_per_mm, sides, most), np.arange(1 + sides))
+
+
+def _placed(term: Term, pixels_per_mm: Array, sides: int, between: Array) -> Array:
+    """`place`, given how much of the term may be between one tap and the next (L,); but for the middle, which is as far
+    out as that lets it be, or farther in."""
+    offset: list[Array] = []
+    done = term.within[-1] - 0.5 * between[:, None]
+    for _ in range(sides + 1):
+        starts = [np.interp(d, w, term.x) for d, w in zip(done.T, term.within.T, strict=True)]
+        offset.append(np.ceil(np.max(starts, axis=0) * pixels_per_mm - 0.5))
+        ends = (offset[-1] - 0.5) / pixels_per_mm
+        done = np.stack([np.interp(ends, term.x, w) for w in term.within.T], axis=1) - between[:, None]
+    return np.stack(offset[::-1], axis=1)
+
+
+def _within(term: Term, pixels: Array, pixels_per_mm: Array) -> Array:
+    """What a term has (L, n, 3) within so many pixels of the middle (L, n) on both sides."""
+    return np.stack([np.interp(pixels / pixels_per_mm[:, None], term.x, w) for w in term.within.T], axis=-1)
