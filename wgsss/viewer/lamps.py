@@ -15,6 +15,8 @@ from wgsss.viewer.knobs import choice, shortened
 if TYPE_CHECKING:
     from wgsss.viewer.window import Window
 
+POWERS = {"irradiance": "W/m²", "intensity": "W/sr", "radiance": "W/(m² sr)"}
+
 
 def lamp(window: Window) -> None:
     """Declare them. Lights other than the first stay as they are."""
@@ -41,10 +43,10 @@ def _powered(light: Any) -> Any:
     """With another strength, that of its strongest channel, or colour."""
     from imgui_bundle import imgui
 
-    power = next(f.name for f in fields(light) if f.name in ("irradiance", "intensity", "radiance"))
+    power = next(f.name for f in fields(light) if f.name in POWERS)
     value = getattr(light, power)
     strength = max(*value, 1e-6)
-    changed, new = imgui.drag_float(power, strength, 0.01 * strength, 0.0, 1e9, "%.4g")
+    changed, new = imgui.drag_float(power, strength, 0.01 * strength, 0.0, 1e9, f"%.4g {POWERS[power]}")
     if changed and new > 0.0:
         return replace(light, **{power: tuple(shortened(x * new / strength) for x in value)})
     changed, tint = imgui.color_edit3("colour", [x / strength for x in value], imgui.ColorEditFlags_.float)
@@ -59,9 +61,9 @@ def _aimed(light: Light, centre: Any) -> Light:
 
     clamped = imgui.SliderFlags_.always_clamp
     if isinstance(light, EnvironmentLight):
-        changed, rotation = imgui.slider_float("rotation", light.rotation, 0.0, 360.0, "%.1f deg", clamped)
+        changed, rotation = imgui.slider_float("rotation", light.rotation, 0.0, 360.0, "%.1f °", clamped)
         return replace(light, rotation=shortened(rotation)) if changed else light
     azimuth, elevation = controls.bearing(light, centre)
-    turned, azimuth = imgui.slider_float("azimuth", azimuth, -180.0, 180.0, "%.1f deg", clamped)
-    raised, elevation = imgui.slider_float("elevation", elevation, -90.0, 90.0, "%.1f deg", clamped)
+    turned, azimuth = imgui.slider_float("azimuth", azimuth, -180.0, 180.0, "%.1f °", clamped)
+    raised, elevation = imgui.slider_float("elevation", elevation, -90.0, 90.0, "%.1f °", clamped)
     return controls.aim(light, centre, azimuth, elevation) if turned or raised else light

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from wgsss.scene import Material
     from wgsss.viewer.window import Window
 
-COEFFICIENTS = ("sigma_a", "sigma_s_prime")
+COEFFICIENTS = {"sigma_a": (1e-5, 10.0), "sigma_s_prime": (1e-2, 100.0)}
+"""1/mm, as far as sliders go"""
+CHANNELS = "red", "green", "blue"
 FURTHEST = 30.0
 """mm, of the plot"""
 KEPT = ("eta", "roughness", "specular", "base_color", "color_after")
@@ -29,18 +31,30 @@ def medium(window: Window) -> None:
     chosen = choice("preset", material.name, MATERIALS)
     if chosen != material.name:
         window.attempt(lambda: state.wear(chosen))
-    elif material.sigma_a is not None and material.sigma_s_prime is not None:
-        table = changed_table(material, {})
-        edited: dict[str, Any] = {}
-        for name in COEFFICIENTS:
-            changed, values = imgui.drag_float3(name, table[name], 0.002, 0.0, 100.0, "%.4g")
-            edited |= {name: [shortened(x) for x in values]} if changed else {}
+    _plot(material)
+    if material.sigma_a is not None and material.sigma_s_prime is not None:
+        edited = _coefficients(material)
         changed, roughness = imgui.slider_float("roughness", material.roughness, 0.05, 1.0, "%.2f")
         edited |= {"roughness": shortened(roughness)} if changed else {}
-        imgui.text_disabled("coefficients in 1/mm: red, green, blue")
         if edited:
             window.attempt(lambda: state.wear(changed_table(material, edited)))
-    _plot(material)
+
+
+def _coefficients(material: Material) -> dict[str, Any]:
+    """Those that sliders have changed."""
+    from imgui_bundle import imgui
+
+    wide = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
+    edited: dict[str, Any] = {}
+    for name, (low, high) in COEFFICIENTS.items():
+        values = list(getattr(material, name))
+        imgui.text_disabled(f"{name}, 1/mm")
+        for i, channel in enumerate(CHANNELS):
+            changed, value = imgui.slider_float(f"{channel}##{name}", values[i], low, high, "%.4g", wide)
+            if changed:
+                values[i] = shortened(value)
+                edited = {name: values}
+    return edited
 
 
 def changed_table(material: Material, edited: dict[str, Any]) -> dict[str, Any]:
@@ -58,13 +72,15 @@ def _plot(material: Material) -> None:
 
     r = np.geomspace(0.01, FURTHEST, 96)
     curves = np.maximum(material.profile.reflectance(r), 1e-12)
-    top = 10.0 ** np.ceil(np.log10(curves.max()))
-    if implot.begin_plot("##profile", (-1, 190), implot.Flags_.no_legend | implot.Flags_.no_inputs):
-        implot.setup_axes("r, mm", "R_d, 1/mm^2")
+    top = int(np.ceil(np.log10(curves.max())))
+    if implot.begin_plot("##profile", (-1, 150), implot.Flags_.no_legend | implot.Flags_.no_inputs):
+        implot.setup_axes("r, mm", "R_d, 1/mm²")
         for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
             implot.setup_axis_scale(axis, implot.Scale_.log10)
-        implot.setup_axes_limits(0.01, FURTHEST, 1e-8 * top, top, implot.Cond_.always)
-        for name, curve, colour in zip(("red", "green", "blue"), curves.T, _COLOURS, strict=True):
+        decades = range(top - 8, top + 1, 2)
+        implot.setup_axes_limits(0.01, FURTHEST, 10.0 ** decades[0], 10.0**top, implot.Cond_.always)
+        implot.setup_axis_ticks(implot.ImAxis_.y1, [10.0**n for n in decades], [f"1e{n}" for n in decades])
+        for name, curve, colour in zip(CHANNELS, curves.T, _COLOURS, strict=True):
             spec = implot.Spec()
             spec.line_color, spec.line_weight = imgui.ImVec4(*colour), 1.5
             implot.plot_line(name, r, np.ascontiguousarray(curve), spec)

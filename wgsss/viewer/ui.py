@@ -56,6 +56,7 @@ class Ui:
         pointer = "pointer_down", "pointer_move", "pointer_up", "wheel", "double_click"
         canvas.add_event_handler(self._on_pointer, *pointer, order=-100)
         canvas.add_event_handler(self._on_key, "key_down", "key_up", "char", order=-100)
+        canvas.add_event_handler(self._keep_key, "key_down", "key_up", order=-98)  # after the renderer has told of it
         canvas.add_event_handler(lambda event: self._wake(), "resize", order=-100)
 
     def render(self) -> None:
@@ -117,6 +118,10 @@ class Ui:
     def _on_key(self, event: Any) -> None:
         self._io.want_capture_keyboard |= self._has_keys
         self._wake(self._owed + FRAMES)
+
+    def _keep_key(self, event: Any) -> None:
+        """The renderer passes on keys that Dear ImGui has no name for, such as a point that is typed."""
+        event["stop_propagation"] = self._io.want_capture_keyboard
 
     def _wake(self, frames: int = FRAMES) -> None:
         """Draw so many frames at least, and one more when nothing else comes."""
