@@ -114,7 +114,7 @@ def _compared(window: Window) -> None:
         if changed:
             shown: Any = {name: knobs.shortened(value)}
             state.scene = replace(state.scene, **shown)
-    _row(window, {"reset view and lights": state.reset, "swap sides": state.methods.reverse})
+    _row(window, {"reset view, lights": state.reset, "swap sides": state.methods.reverse})
 
 
 def _side(window: Window, side: int) -> None:
