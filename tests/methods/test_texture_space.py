@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import MATTE, lit, plane
+from scipy.stats import norm
 
 from wgsss import frame as shared
 from wgsss.graph import Graph
@@ -165,6 +166,20 @@ def test_wide_blurs_find_their_way_over_jagged_borders(gpu):
     M = Renderer(scene, TextureSpace(map_size=1024), (96, 96), gpu).frame(aovs=["M_front"]).aovs["M_front"]
     inside = M[:, 20:76, 0]  # away from the silhouette, where a pixel sees several millimetres
     assert np.abs(inside - inside.mean(axis=0)).max() < 0.01
+
+
+def test_blurs_go_round_a_thin_bar(gpu, monkeypatch):
+    """Of four faces one is lit: over the perimeter of 6 mm light spreads by 2 mm, so that taps cross up to four edges."""
+    monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)
+    wide = replace(MATTE, gaussians=SumOfGaussians(np.array([4.0]), np.ones((1, 3))))
+    bar = slab(size=(1.5, 22.0, 1.5), vertices=1000)
+    for towards, middle in (((0, 0, 50), 0.0), ((50, 0, 0), 1.5), ((0, 0, -50), 3.0)):
+        camera = OrthographicCamera(towards, (0, 0, 0), height=1.2)
+        scene = lit(DirectionalLight((0, 0, -1), (1, 1, 1)), mesh=bar, material=wide, camera=camera)
+        M = Renderer(scene, TextureSpace(map_size=512), (16, 16), gpu).frame(aovs=["M_front"]).aovs["M_front"]
+        s = middle + ((np.arange(16) + 0.5) / 16 - 0.5) * camera.height + 6.0 * np.arange(-3, 4)[:, None]
+        expected = (norm.cdf((s + 0.75) / 2) - norm.cdf((s - 0.75) / 2)).sum(axis=0)
+        np.testing.assert_allclose(M[..., 0], np.broadcast_to(expected, (16, 16)), rtol=0.04)
 
 
 def test_vanishing_width_is_lambert(gpu):
