@@ -23,19 +23,28 @@ LABELS = 110
 """logical pixels of the panel's width, for what stands right of a control"""
 NOTES = 92
 """logical pixels of the panel's height, for what went wrong"""
-KEYS = """drag  orbit     shift or right drag  pan
-ctrl drag  light     wheel, + -  zoom
-arrows  orbit     shift arrows  pan
-double click, F  look there     R  reset
-1 2 3 4  split, left, right, error     Tab  flicker
-X  swap sides     L  next layer
-E  senders of the vertex under the pointer
-space  play     .  step
-S  screenshot     C  copy as command     Q  close
-P  keys to this panel:
-  arrows, Tab  from control to control
-  space  take hold, then arrows     enter  type
-  escape  back"""
+KEYS = (
+    ("drag, arrows", "orbit"),
+    ("shift or right drag", "pan (shift arrows)"),
+    ("wheel, + -", "zoom"),
+    ("ctrl drag", "turn the light"),
+    ("double click, F", "look at that point"),
+    ("1 2 3 4", "split, left, right, error"),
+    ("Tab, X", "flicker, swap sides"),
+    ("L", "next layer"),
+    ("E", "senders of the vertex"),
+    ("space, .", "play or pause, step"),
+    ("S, C", "screenshot, copy command"),
+    ("R, Q", "reset view and lights, close"),
+    ("P", "this panel takes the keys:"),
+    ("  arrows, Tab", "from control to control"),
+    ("  space", "take hold; arrows change it"),
+    ("  enter", "open, press, or type a value"),
+    ("  escape", "back to the pictures"),
+)
+"""and what they do"""
+KEYS_WIDTH = 130
+"""logical pixels"""
 OPEN = {*SIDES, "passes"}
 """headings that are open the first time"""
 
@@ -144,7 +153,10 @@ def _time(window: Window) -> None:
 def _keys(window: Window) -> None:
     from imgui_bundle import imgui
 
-    imgui.text_wrapped(KEYS)
+    for key, act in KEYS:
+        imgui.text(key)
+        imgui.same_line(KEYS_WIDTH)
+        imgui.text_wrapped(act)
 
 
 _MORE = {
