@@ -1,8 +1,10 @@
-"""A desktop for a window under test: a virtual screen, and someone at pointer and keys."""
+"""A desktop for a window under test: a virtual screen, and someone at pointer and keys who knows the viewer."""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,13 +16,39 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image as Picture
+from PIL import ImageGrab
+
+from wgsss.cli import main
+from wgsss.viewer.panels import PANEL_WIDTH
 
 ROOT = Path(__file__).parents[1]
 SCREEN = 1000, 640
 NEEDS = "Xvfb", "xdotool"
 PATIENCE_S = 60.0
 
+WINDOW = 700, 420
+"""pixels, of windows that are opened with SMALL"""
+SMALL = "--size", f"{WINDOW[0]}x{WINDOW[1]}"
+CUT = (WINDOW[0] - PANEL_WIDTH) // 2
+"""pixels of a picture that are the left side's"""
+DIVIDER = PANEL_WIDTH + CUT
+LEFT, RIGHT = (DIVIDER - 60, 200), (DIVIDER + 60, 200)
+"""places on either side"""
+
 Pixels = npt.NDArray[np.uint8]
+
+
+def pictures(screen: Pixels) -> Pixels:
+    """What the window shows beside its panel."""
+    return screen[: WINDOW[1], PANEL_WIDTH : WINDOW[0]]
+
+
+def shown(file: Path) -> Pixels:
+    """uint8 (H, W, 3): a PNG as the window shows it, on black."""
+    with Picture.open(file) as picture:
+        rgba = np.asarray(picture.convert("RGBA"))
+    return rgba[..., :3] * (rgba[..., 3:] > 0)
 
 
 def missing() -> str:
@@ -39,6 +67,7 @@ class Desk:
 
     def __init__(self, display: str, program: subprocess.Popen[str], output: Path) -> None:
         self.display, self.program, self.output = display, program, output
+        self.looks = 0
 
     def do(self, *words: Any) -> str:
         """An xdotool command."""
@@ -57,9 +86,36 @@ class Desk:
 
     def look(self) -> Pixels:
         """uint8 (H, W, 3): the screen."""
-        from PIL import ImageGrab
-
         return np.asarray(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
+
+    def minimise(self, back: bool = False) -> None:
+        """What a window manager does to an icon: unmap the window and say so; or map it again."""
+        x11 = ctypes.CDLL("libX11.so.6")
+        x11.XOpenDisplay.restype = x11.XInternAtom.restype = ctypes.c_void_p
+        screen = ctypes.c_void_p(x11.XOpenDisplay(self.display.encode()))
+        word = ctypes.c_ulong(x11.XInternAtom(screen, b"WM_STATE", False))
+        state = (ctypes.c_long * 2)(1 if back else 3, 0)
+        x11.XChangeProperty(screen, ctypes.c_ulong(self.window), word, word, 32, 0, state, 2)
+        (x11.XMapWindow if back else x11.XUnmapWindow)(screen, ctypes.c_ulong(self.window))
+        x11.XCloseDisplay(screen)
+
+    @property
+    def window(self) -> int:
+        """Its number."""
+        return int(self.do("search", "--name", "wgsss").split()[0])
+
+    def copied(self, at: tuple[int, int]) -> list[str]:
+        """The words of the command that the window copies for the side under a place."""
+        said = len(self.said())
+        self.do("mousemove", *at, "key", "c")
+        self.settled(lambda _: "copied: " in self.said()[said:])
+        return shlex.split(self.said()[said:].split("copied: ")[1].splitlines()[0])
+
+    def drawn(self, at: tuple[int, int]) -> Pixels:
+        """What that command draws."""
+        file = self.output.with_name("drawn.png")
+        assert main([*self.copied(at)[1:], "-o", str(file)]) == 0
+        return shown(file)
 
     def settled(self, wanted: Callable[[Pixels], bool] = lambda pixels: True) -> Pixels:
         """The screen once it stays as it is, and as it is wanted."""
@@ -70,9 +126,15 @@ class Desk:
             assert self.program.poll() is None, self.said()
             now = self.look()
             if np.array_equal(now, last) and now.any() and wanted(now):
+                self._keep(now)
                 return now
             last = now
         raise AssertionError(f"the window did not come to rest as wanted; it said: {self.said()}")
+
+    def _keep(self, pixels: Pixels) -> None:
+        """Beside what was said, for who wants to see."""
+        self.looks += 1
+        Picture.fromarray(pixels).save(self.output.with_name(f"look-{self.looks:03}.png"))
 
     def said(self) -> str:
         """What the program has printed."""

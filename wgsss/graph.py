@@ -99,6 +99,8 @@ class Graph:
             self._write_new(item, "depth", Resource(f"{item.name}.depth", "depth32float", (*size, 1)))
         elif isinstance(depth_buffer, Handle):
             self._write_on(item, "depth", depth_buffer)
+        if not item.writes:
+            raise WgslError(f"{item.name}: draws nothing: it has neither targets nor a depth buffer")
         written = item.writes.get("depth")
         keep_depth = written is not None and written.layer(layer) in written.resource.drawn
         import wgpu
