@@ -66,6 +66,7 @@ def check(window: Desk, before: Pixels, said: str, folder: Path) -> None:
     after = left_of(window.settled(lambda screen: not np.array_equal(left_of(screen), before)))
     command = copied(window)
     assert said in " ".join(command)
+    assert "--camera" not in command, "what is dragged in the panel is the panel's"
     np.testing.assert_array_equal(after, drawn(command, folder)[:, : after.shape[1]])
 
 
