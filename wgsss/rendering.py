@@ -49,10 +49,12 @@ class Image:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A frame by one method, as declared: radiance, the image for a display, and `layers`, by AOVS; None is black."""
+    """A frame by one method, as declared: radiance, the image for a display, what M is the sum of, and `layers`, by
+    AOVS; None is black."""
 
     radiance: Handle
     display: Handle
+    M: tuple[Handle, ...]
     layers: dict[str, Handle | None]
 
 
@@ -60,7 +62,8 @@ def draw(frame: shared.Frame, method: Method) -> Drawn:
     """Declare the passes that draw a frame by a method."""
     diffused = method.passes(frame)
     reflected = shared.specular(frame)
-    radiance = shared.composite(frame, diffused.M_front, diffused.M_back, reflected)
+    first, *second = diffused.M
+    radiance = shared.composite(frame, first, second[0] if second else None, reflected)
     scene = frame.stage.scene
     layers = {
         "irradiance": shared.irradiance_pixels(frame),
@@ -71,7 +74,8 @@ def draw(frame: shared.Frame, method: Method) -> Drawn:
         "normal": frame.gbuffer.normal,
     }
     shown = shared.bloom(frame.graph, radiance, scene.bloom)
-    return Drawn(radiance, shared.tone_map(frame.graph, shown, scene.exposure, scene.tone_map), layers)
+    display = shared.tone_map(frame.graph, shown, scene.exposure, scene.tone_map)
+    return Drawn(radiance, display, diffused.M, layers)
 
 
 class Renderer:

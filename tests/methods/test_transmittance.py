@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scenes import ABOVE, MATTE, WHITE, lit, plane
 
+from wgsss.frame import begin
+from wgsss.graph import Graph
 from wgsss.methods import make_method
 from wgsss.methods.transmittance import table
 from wgsss.optics import SKIN_GAUSSIANS, Dipole, SumOfGaussians
@@ -125,15 +127,16 @@ def test_the_lit_side_gets_next_to_nothing(gpu, angle):
     assert through(gpu, lit(light, mesh=plate(3.0), material=SKIN, camera=ABOVE)).max() < 5e-3
 
 
-@pytest.mark.parametrize("depth", [60.0, 12.0, 400.0])
+@pytest.mark.parametrize("depth", [60.0, 12.0, 8.0, 400.0])
 def test_point_lights(gpu, depth):
-    """Seen by one view of the scene, from amid it by a cube, whose faces meet where its light is at 45 degrees, and
-    from so far away that rays are parallel."""
+    """Seen by one view of the scene, from amid it by a cube, and from so far away that rays are parallel. Faces of the
+    cube meet where light passes at 45 degrees: from a depth of 8 mm about where x = 8, or before where the ray is taken
+    below."""
     light = PointLight((0, -depth, 0), intensity=(1, 1, 1))
     if depth == 400.0:
         light = PointLight((0, -1e5, 0), intensity=(1e4, 1e4, 1e4))
     below = Object(plane(side=40.0, y=-30.0), MATTE)
-    scene = lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE, extra=(below,) if depth == 12.0 else ())
+    scene = lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE, extra=(below,) if depth <= 12.0 else ())
     way = floor_points() - light.position
     distance = np.linalg.norm(way, axis=-1, keepdims=True)
     cosine = way[..., 1:2] / distance
@@ -142,6 +145,24 @@ def test_point_lights(gpu, depth):
     np.testing.assert_allclose(
         found, np.broadcast_to(depth_in_a_plate(6.0, cosine, distance), found.shape), atol=4 * TEXEL
     )
+
+
+def test_rays_are_taken_below_by_shadow_texels_that_grow_with_distance(gpu):
+    """Lit aslant from in front, by one face of a cube: 60 mm away a texel is 0.06 mm wide."""
+    beyond = Object(plane(side=40.0, y=-30.0), MATTE, translate=(100, 0, 0))
+    light = PointLight((60, 15, 0), intensity=(1, 1, 1))
+    scene = lit(light, mesh=plate(30.0, side=60.0), material=WIDE, camera=ABOVE, extra=(beyond,))
+    way = floor_points() - light.position
+    distance = np.linalg.norm(way, axis=-1, keepdims=True)
+    cosine = -way[..., 1:2] / distance
+    shrink = 2 * np.sqrt(1 - cosine**2) * (2 / 2048 * distance) + RADIUS * (1 - cosine**2)
+    lowered = np.linalg.norm(way - shrink * [0, 1, 0], axis=-1, keepdims=True)
+    expected = lowered * shrink / (15 + shrink) - shrink * cosine
+    E = (0.3 - cosine) / (distance / 1000) ** 2
+    on = ((expected < 17) & (cosine < 0.29))[..., 0]
+    assert on.sum() > 100
+    found = thickness_by(through(gpu, scene)[on], E[on])
+    np.testing.assert_allclose(found, np.broadcast_to(expected[on], found.shape), atol=0.02)
 
 
 def test_area_lights(gpu):
@@ -198,7 +219,7 @@ def test_the_sky_alone_costs_nothing(gpu):
         assert (image.aovs["M_back"] == 0).all()
         blurs = [item for item in image.graph.passes if item.module.name == "screen_space/blur"]
         assert not any(item.module.name.startswith("transmittance") for item in image.graph.passes)
-        assert len(blurs) == (2 if name == "jimenez15" else 0)
+        assert len(blurs) == (2 if name == "jimenez15" else 0)  # none for a sum, none for M_back
 
 
 def test_what_is_far_in_front_keeps_the_light_off(gpu):
@@ -240,6 +261,28 @@ def test_screen_space_blurs_it(gpu):
     response = SKIN_GAUSSIANS.step_response(x[inner])[:, 0]
     np.testing.assert_allclose(soft[48, inner], full * response, atol=0.03 * full)
     assert np.abs(np.diff(sharp[48])).max() > 0.5 * full
+
+
+@pytest.mark.parametrize("kernel", ["line-spread", "svd"])
+def test_one_blur_is_that_of_both(gpu, kernel):
+    """Of an image alone; M_front and M_back are blurred apart for who asks for them."""
+    half = Object(Mesh(plane(side=30.0, y=-14.0).positions - np.float32([15, 0, 0]), plane().faces), MATTE)
+    other = Object(plate(1.0, side=6.0), WIDE, translate=(0, 3, 0))
+    lights = (UP, DirectionalLight((0.5, -1, 0), (3, 2, 1)))
+    scene = lit(*lights, mesh=plate(1.0, side=14.0), material=SKIN, camera=ABOVE, extra=(half, other))
+    renderer = Renderer(scene, make_method("jimenez15", {"kernel": kernel}), (48, 48), gpu)
+    image = renderer.frame(timed=False)
+    apart = renderer.frame(aovs=["M_front", "M_back"], timed=False)
+    blurs = [sum(p.module.name == "screen_space/blur" for p in shown.graph.ran) for shown in (image, apart)]
+    assert blurs == [3 * 2 * (1 + (kernel == "svd")), 3 * blurs[0]]
+    assert image.pixels.tobytes() == apart.pixels.tobytes()
+
+    graph = Graph(gpu)
+    found = renderer.method.passes(begin(graph, renderer.stage, (48, 48)))
+    graph.run(found.together, found.M_front, found.M_back)
+    together, front, back = (graph.read(part)[..., :3] for part in (found.together, found.M_front, found.M_back))
+    np.testing.assert_allclose(together, front + back, rtol=1e-4, atol=1e-5)
+    assert min(front.max(), back.max()) > 0.1 and found.M == (found.together,)
 
 
 def test_channels_that_reflect_nothing(gpu):

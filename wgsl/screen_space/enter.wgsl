@@ -1,4 +1,5 @@
-// What enters one object at its pixels, and which way its surface runs there: the input of the blurs.
+// What enters one object at its pixels, and what arrives there from behind as if it did; and which way its surface runs
+// there: the input of the blurs.
 
 import package::mesh::{Surface, color_before};
 import package::rectangle::{rectangle_corner};
@@ -16,9 +17,10 @@ struct Params {
 @group(0) @binding(4) var base_color: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
 @group(0) @binding(6) var irradiance: texture_2d<f32>;
+@group(0) @binding(7) var behind: texture_2d<f32>; // or a single black texel
 
 struct Pixel {
-    @location(0) entering: RGBA32Float, // L_d times the base colour's share before diffusion; 1 - depth, 0 off the object
+    @location(0) entering: RGBA32Float, // times the base colour's share before diffusion; 1 - depth, 0 off the object
     @location(1) slope: RG32Float,      // of the depth, per pixel to the right and down: the same all over a plane
 }
 
@@ -47,5 +49,6 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let facing = min(dot(n, away), -LEAST_COSINE * length(away));
     let slope = -vec2f(dot(n, right.xyz - x * right.w), dot(n, down.xyz - x * down.w)) / facing;
     let color = color_before(surface, textureLoad(base_color, texel, 0).rgb);
-    return Pixel(vec4f(textureLoad(irradiance, texel, 0).rgb * color, 1.0 - here), slope);
+    let arriving = textureLoad(behind, min(texel, textureDimensions(behind) - 1u), 0).rgb;
+    return Pixel(vec4f((textureLoad(irradiance, texel, 0).rgb + arriving) * color, 1.0 - here), slope);
 }

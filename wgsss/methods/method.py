@@ -12,10 +12,22 @@ from wgsss.stage import Stage
 
 @dataclass(frozen=True)
 class Diffused:
-    """What a method estimates, per pixel, rgba32float at the frame's size: M in W/m^2. A slot left empty is None."""
+    """What a method estimates, per pixel, rgba32float at the frame's size: M in W/m^2. A slot left empty is None.
+
+    `together` is M_front + M_back, where there is a shorter way to that than to each: what asks for one of them alone
+    pays for it.
+    """
 
     M_front: Handle
     M_back: Handle | None = None
+    together: Handle | None = None
+
+    @property
+    def M(self) -> tuple[Handle, ...]:
+        """What M is the sum of."""
+        if self.together is not None:
+            return (self.together,)
+        return (self.M_front,) if self.M_back is None else (self.M_front, self.M_back)
 
 
 class Method(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field, fields, make_dataclass, replace
 from functools import cache
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from wgsss.frame import Frame
 from wgsss.graph import Handle
@@ -30,6 +30,14 @@ class Translucency(Protocol):
         """Declare the passes that estimate M_back, W/m^2 per pixel; None where nothing shines through."""
 
 
+@runtime_checkable
+class Joined(Protocol):
+    """A translucency whose light some surface may diffuse along with its own."""
+
+    def M(self, frame: Frame, surface: Method) -> Handle | None:
+        """Declare the passes that estimate M_front + M_back at once; None where that is no shorter."""
+
+
 class Pair:
     """M_front by one technique and M_back by another; the knobs are those of both."""
 
@@ -44,7 +52,8 @@ class Pair:
 
     def passes(self, frame: Frame) -> Diffused:
         surface, translucency = self.made()
-        return replace(surface.passes(frame), M_back=translucency.M_back(frame, surface))
+        M = translucency.M(frame, surface) if isinstance(translucency, Joined) else None
+        return replace(surface.passes(frame), M_back=translucency.M_back(frame, surface), together=M)
 
     def made(self) -> tuple[Method, Translucency]:
         """The two parts with their knobs set."""

@@ -76,17 +76,19 @@ class ScreenSpace:
         return body.stage.shared(("separable", id(body.material), self.kernel, taps), make)
 
     def passes(self, frame: Frame) -> Diffused:
-        return Diffused(frame.once(self, lambda: self._M_front(frame)))
+        return Diffused(frame.once(self, lambda: self.diffuse(frame, shared.irradiance_pixels(frame))))
 
-    def _M_front(self, frame: Frame) -> Handle:
-        irradiance = shared.irradiance_pixels(frame)
-        M_front: Any = None
+    def diffuse(self, frame: Frame, irradiance: Handle, behind: Handle | None = None) -> Handle:
+        """M of what enters at the pixels, W/m^2, and of what arrives there from behind as if it entered."""
+        M: Any = None
         for body in frame.stage.bodies:
-            M_front = self.diffuse(frame, body, irradiance, M_front)
-        return M_front
+            M = self._diffuse(frame, body, irradiance, behind, M)
+        return M
 
-    def diffuse(self, frame: Frame, body: Body, irradiance: Handle, into: Handle | None) -> Handle:
-        """M_front of one body, drawn onto `into`."""
+    def _diffuse(
+        self, frame: Frame, body: Body, irradiance: Handle, behind: Handle | None, into: Handle | None
+    ) -> Handle:
+        """That of one body, drawn onto `into`."""
         graph = frame.graph
         where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
         entered = graph.draw(
@@ -96,6 +98,7 @@ class ScreenSpace:
             surface=body.surface,
             params=where,
             irradiance=irradiance,
+            behind=behind or frame.stage.gpu.black,
             **frame.seen("where_seen", "normal", "base_color", "depth"),
         )
         terms = self.weights(body, self.taps or taps_for(frame, body))

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss import wgsl
-from wgsss.frame import Frame, rectangle
+from wgsss.frame import Frame, irradiance_pixels, rectangle
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.methods.screen_space import ScreenSpace
@@ -70,43 +70,55 @@ class Transmittance:
         return body.stage.shared(("transmittance", id(body.material)), make)
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:
-        if not frame.lighting.views:
-            return None  # the sky alone
-        arriving: Any = None
+        arriving = self.arriving(frame)
+        if arriving is None:
+            return None
+        if isinstance(surface, ScreenSpace):
+            return surface.diffuse(frame, arriving)
         M_back: Any = None
         for body in frame.stage.bodies:
-            arriving = self.arriving(frame, body, arriving)
-        for body in frame.stage.bodies:
-            if isinstance(surface, ScreenSpace):
-                M_back = surface.diffuse(frame, body, arriving, M_back)
-            else:
-                M_back = frame.graph.draw(
-                    "lambert/reflect",
-                    into=M_back,
-                    size=frame.size,
-                    count=6,
-                    label="back",
-                    params={"total": body.material.profile.total, "rectangle": rectangle(frame, body)},
-                    surface=body.surface,
-                    irradiance=arriving,
-                    **frame.seen("where_seen", "base_color"),
-                )
+            M_back = frame.graph.draw(
+                "lambert/reflect",
+                into=M_back,
+                size=frame.size,
+                count=6,
+                label="back",
+                params={"total": body.material.profile.total, "rectangle": rectangle(frame, body)},
+                surface=body.surface,
+                irradiance=arriving,
+                **frame.seen("where_seen", "base_color"),
+            )
         return M_back
 
-    def arriving(self, frame: Frame, body: Body, into: Handle | None) -> Handle:
-        """What arrives at a body's pixels from behind, W/m^2, as a share of the profile's total; drawn onto `into`."""
-        lengths, through = self.table(body)
-        where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
-        return frame.graph.draw(
-            "transmittance/transmit",
-            into=into,
-            size=frame.size,
-            count=6,
-            params={**lengths, **where},
-            through=through,
-            **frame.seen("where_seen", "normal", "depth"),
-            **frame.light_bindings(body),
-        )
+    def M(self, frame: Frame, surface: Method) -> Handle | None:
+        """One blur in screen space of what enters and what arrives from behind is M_front + M_back of two."""
+        arriving = self.arriving(frame)
+        if arriving is None or not isinstance(surface, ScreenSpace):
+            return None
+        return surface.diffuse(frame, irradiance_pixels(frame), arriving)
+
+    def arriving(self, frame: Frame) -> Handle | None:
+        """What arrives at the pixels from behind, W/m^2, as a share of the profile's total."""
+        if not frame.lighting.views:
+            return None  # the sky alone
+        return frame.once("arriving", lambda: self._arriving(frame))
+
+    def _arriving(self, frame: Frame) -> Handle:
+        arriving: Any = None
+        for body in frame.stage.bodies:
+            lengths, through = self.table(body)
+            where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
+            arriving = frame.graph.draw(
+                "transmittance/transmit",
+                into=arriving,
+                size=frame.size,
+                count=6,
+                params={**lengths, **where},
+                through=through,
+                **frame.seen("where_seen", "normal", "depth"),
+                **frame.light_bindings(body),
+            )
+        return arriving
 
 
 def table(profile: Profile) -> tuple[Array, Array]:

@@ -31,7 +31,7 @@ class Picture:
 
     Attributes:
         display: rgba8unorm-srgb, tone mapped, on the device as long as the graph lives; None: black.
-        M: rgba32float, M_front, and M_back where it is not black.
+        M: rgba32float, what M is the sum of.
         passes: names of those that it took, shared ones among them.
     """
 
@@ -108,9 +108,8 @@ class Easel:
             elif layer != "image":  # as if it were light that is seen
                 light = drawn.layers[layer]
                 display = light and shared.tone_map(graph, light, scene.exposure, scene.tone_map)
-            M = tuple(h for h in (drawn.layers["M_front"], drawn.layers["M_back"]) if h is not None)
-            passes = tuple(item.name for item in graph.needed(*([display] if display else []), *M))
-            found.append(Picture(display, M, passes))
+            passes = tuple(item.name for item in graph.needed(*([display] if display else []), *drawn.M))
+            found.append(Picture(display, drawn.M, passes))
         seen = frame.gbuffer.where_seen
         shadows = frame.lighting.shadow_maps
         wanted = [seen, *(h for p in found for h in (p.display, *p.M) if h is not None)]
