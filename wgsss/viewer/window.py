@@ -172,8 +172,10 @@ class Window:
 
     def open(self, source: Source) -> None:
         """Show another scene. Raises InputError for what is wrong with it."""
-        methods, notes = self.state.methods, self.state.notes
-        self.state = replace(State.open(source, methods), notes=notes)
+        opened = State.open(source, self.state.methods)
+        self.state = replace(
+            self.state, source=source, opened=opened.opened, scene=opened.scene, material=None, time_s=0.0
+        )
         self.canvas.set_title(f"wgsss: {source.scene}")
 
     def change_method(self, side: int, method: Method) -> None:
