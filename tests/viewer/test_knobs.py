@@ -47,7 +47,7 @@ def test_sliders_set_short_numbers() -> None:
 
 def test_a_coefficient_set_leaves_the_rest_of_a_material() -> None:
     state = State.open(Source("slab", vertices=300), [])
-    state.wear({"preset": "ketchup", "roughness": 0.31, "base_color": [0.5, 0.6, 0.7], "eta": 1.4})
+    state.wear({"preset": "ketchup", "roughness": 0.31, "specular": 0.5, "base_color": [0.5, 0.6, 0.7], "eta": 1.4})
     before: Any = state.scene.objects[0].material
     state.wear(changed_table(before, {"sigma_a": [0.1, 0.2, 0.3]}))
     after: Any = state.scene.objects[0].material
