@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import sys
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,12 @@ from wgsss.gpu import TextureKey
 from wgsss.methods import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, load_scene
+
+KNOBS: dict[str, dict[str, Any]] = {
+    "deon07": {"map_size": 64},
+    "jimenez08": {"map_size": 64},
+    "sam": {"surface": "screen"},
+}
 
 
 def test_scenes_without_shadows_leave_no_textures_behind(gpu):
@@ -31,6 +39,21 @@ def test_frames_of_earlier_sizes_leave_no_textures_behind(gpu):
         assert {size[0] for size in pooled if size[1] == 7} == {width}
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_what_a_renderer_holds_goes_with_it(gpu, method):
+    """At once, not when garbage is collected, which knows nothing of the device's memory."""
+    scene = load_scene("sphere", vertices=500)
+    gc.disable()
+    try:
+        renderer = Renderer(scene, make_method(method, KNOBS.get(method)), (8, 8), gpu)
+        renderer.frame(timed=False)
+        stage = weakref.ref(renderer.stage)
+        del renderer
+        assert stage() is None
+    finally:
+        gc.enable()
+
+
 def resident() -> int:
     """Bytes of memory that this process holds, the driver's included."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
@@ -39,8 +62,7 @@ def resident() -> int:
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory it holds")
 @pytest.mark.parametrize("method", METHODS)
 def test_memory_does_not_grow_from_frame_to_frame(gpu, method):
-    knobs: dict[str, dict[str, Any]] = {"deon07": {"map_size": 64}, "sam": {"surface": "screen"}}
-    renderer = Renderer(load_scene("wave", vertices=1000), make_method(method, knobs.get(method)), (32, 32), gpu)
+    renderer = Renderer(load_scene("wave", vertices=1000), make_method(method, KNOBS.get(method)), (32, 32), gpu)
     for number in range(10):
         renderer.frame(number / 25, timed=False)
     before = resident()

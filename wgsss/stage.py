@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from functools import cached_property
 from types import SimpleNamespace
@@ -70,10 +71,16 @@ class Body:
     """One object of a stage, with its buffers and textures."""
 
     def __init__(self, stage: Stage, index: int) -> None:
-        self.stage = stage
+        self._stage = weakref.ref(stage)  # or what both hold on the device would stay until garbage is collected
         self.index = index
         self._unwrapped = False
         self._posed: tuple[float, Any] | None = None
+
+    @property
+    def stage(self) -> Stage:
+        stage = self._stage()
+        assert stage is not None, "a body lives as long as its stage"
+        return stage
 
     @property
     def rest(self) -> Object:

@@ -50,7 +50,8 @@ def test_a_wall_hides_half() -> None:
 
 def test_nothing_hides_from_a_convex_body_and_all_is_dark_inside(gpu: Gpu) -> None:
     scene = lit(SKY, mesh=ball(0.0))
-    assert Stage(gpu, scene).bodies[0].sky.min() > 0.995
+    stage = Stage(gpu, scene)
+    assert stage.bodies[0].sky.min() > 0.995
     assert seen(scene, (1, 0, 0)) == 0.0
 
 
@@ -92,5 +93,6 @@ def test_the_skys_reflection_is_hidden_likewise(gpu: Gpu) -> None:
 def test_objects_of_one_mesh_have_their_own_skies(gpu: Gpu) -> None:
     flat = plane(side=10.0, cells=4)
     scene = lit(SKY, mesh=flat, extra=(Object(flat, MATTE, translate=(0, 1, 0)),))
-    lower, upper = Stage(gpu, scene).bodies
+    stage = Stage(gpu, scene)
+    lower, upper = stage.bodies
     assert lower.sky.min() < 0.1 and upper.sky.min() == 1.0
