@@ -5,9 +5,10 @@ No light of these is among those that `fit` is tried on.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
-from tqdm import tqdm
+from tqdm import trange
 
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.frame import begin
@@ -21,6 +22,8 @@ from wgsss.stage import Body, Stage
 
 SUNS = [DirectionalLight(towards, (1, 1, 1)) for towards in ((2, -3, -6), (-6, -2, 3), (3, 6, 2), (0.3, 0.1, 1))]
 SKY = EnvironmentLight((1, 1, 1))
+PAIRS = 2_000_000
+"""whose form factors are integrated at a time"""
 
 
 class Errors:
@@ -51,9 +54,14 @@ def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.nda
     factors = FormFactors(body.stage.gpu, body.mesh, body.material.profile)
     light = np.stack(L_d).astype(np.float64)
     found = np.zeros((len(light), len(receivers), 3))
-    for row, o in enumerate(tqdm(receivers, desc="sums over all senders", disable=None)):
-        i = np.flatnonzero(((x - x[o]) @ n[o] < 0.0) & (n @ n[o] < 0.0))
-        found[:, row] = np.einsum("kc,lkc->lc", factors.of(np.stack([np.full(len(i), o), i], axis=1)), light[:, i])
+    at_once = max(PAIRS // len(x), 1)
+    for first in trange(0, len(receivers), at_once, desc="sums over all senders", disable=None):
+        o = receivers[first : first + at_once]
+        row, i = np.nonzero((x @ n[o].T < (x[o] * n[o]).sum(axis=1)).T & (n[o] @ n.T < 0.0))
+        K = factors.of(np.stack([o[row], i], axis=1)).astype(np.float64)
+        starts = np.searchsorted(row, np.arange(len(o) + 1))
+        for k, (a, b) in enumerate(pairwise(starts), first):
+            found[:, k] = np.einsum("kc,lkc->lc", K[a:b], light[:, i[a:b]])
     return found
 
 

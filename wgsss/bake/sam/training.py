@@ -17,7 +17,7 @@ SKIES = 24
 """half skies, without shadows: what suns never reach is lit by something too"""
 SKY_WEIGHT, EVEN_WEIGHT = 1.0, 3.5
 """of a sky's error and of that under even light, which sets how much light there is in all, over a sun's"""
-COMPONENTS = 96
+COMPONENTS = 128
 """numbers that irradiances are compressed to"""
 _AT_ONCE = 1 << 16  # vertices
 _LIFT = 1e-4  # of the mesh's extent: how far above the surface rays start
