@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from scenes import ABOVE, MATTE, WHITE, lit, plane, write_environment
 
+from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
+from wgsss.graph import Graph
+from wgsss.methods import Lambert, make_method, name_of
 from wgsss.methods import local_thickness as module
-from wgsss.methods import make_method, name_of
 from wgsss.methods.local_thickness import LocalThickness
 from wgsss.rendering import Renderer, render
 from wgsss.scene import (
@@ -260,6 +262,36 @@ def test_materials_may_have_their_own_parameters(gpu: Gpu, even: None, stored: s
         wanted = albedo * BELOW.irradiance * (1.5 * dot + ambient)[..., None] * thickness
         assert inside.sum() > 100
         np.testing.assert_allclose(M_back[inside], wanted[inside], rtol=0.012)
+
+
+@pytest.mark.parametrize("kind", ["coloured", "grey"])
+def test_the_texels_of_a_g_buffer(gpu: Gpu, even: None, kind: str) -> None:
+    """Bytes as the paper lays them out: the material's ID, 3, is the last one, and blue is on top of it; and with the
+    number of the parameters, from 0, in the lowest bits."""
+    red, green, blue = np.sqrt(THICKNESS.astype(np.float64))
+    albedo = MATTE.profile.total
+    grey = np.sqrt((THICKNESS * albedo).sum() / albedo.sum())
+
+    def texel(which: int, several: bool) -> list[int]:
+        if kind == "grey":
+            return [0, 0, 4 * round(63 * grey) + which if several else round(255 * grey), 3]
+        low, high = which & 1, which >> 1
+        pair = (2 * round(127 * red) + low, 2 * round(127 * green) + high)
+        return [0, *(pair if several else (round(255 * red), round(255 * green))), 3 + round(252 * blue)]
+
+    method = LocalThickness(stored="g-buffer", thickness=kind)
+    for number in (1, 4):
+        things = [
+            Object(plane(side=9.0), replace(MATTE, transport=(0.1 * i, 1.0, 0.0)), translate=(10.0 * i - 15.0, 0, 0))
+            for i in range(number)
+        ]
+        stage = Stage(gpu, replace(lit(BELOW, camera=replace(ABOVE, height=40)), objects=tuple(things)))
+        graph = Graph(gpu)
+        assert method.M_back(shared.begin(graph, stage, (40, 40)), Lambert()) is not None
+        stored = [item.writes["stored"] for item in graph.passes if item.module.name == "thickness/gbuffer"][-1]
+        graph.run(stored)
+        found = graph.read(stored)[20, 5 : 10 * number : 10]
+        assert found.tolist() == [texel(i, number > 1) for i in range(number)]
 
 
 def test_a_g_buffer_has_room_for_four_sets_of_parameters(gpu: Gpu, even: None) -> None:
