@@ -73,7 +73,8 @@ def scene(skin: SumOfGaussians, degrees: float, pixels_per_mm: float, size: int)
 
 def error_of_picture(kernel: str, skin: SumOfGaussians, degrees: float, pixels_per_mm: float, size: int) -> float:
     """Of the method as it draws the edge, in the middle of the picture."""
-    where, method = scene(skin, degrees, pixels_per_mm, size), make_method("screen+none", {"kernel": kernel})
+    where = scene(skin, degrees, pixels_per_mm, size)
+    method = make_method("screen+none", {"kernel": kernel, "taps": 17})
     found = Renderer(where, method, (size, size)).frame(aovs=["M_front"], timed=False)
     t = (np.arange(size) + 0.5 - size / 2) / pixels_per_mm
     a = np.radians(degrees)
