@@ -104,10 +104,17 @@ def folded(window: Desk) -> Desk:
     return window
 
 
-def test_a_light_is_aimed_by_a_slider(folded: Desk, tmp_path: Path) -> None:
+BALL = 8 + 48, row(13) + 12 + 48
+"""the middle of the light's"""
+
+
+@pytest.mark.parametrize(
+    ("start", "end"), [((60, row(12)), (90, row(12))), (BALL, (BALL[0] + 20, BALL[1] - 30))], ids=["slider", "ball"]
+)
+def test_a_light_is_aimed(folded: Desk, tmp_path: Path, start: tuple[int, int], end: tuple[int, int]) -> None:
     click(folded, 8)
     before = left_of(folded.settled())
-    folded.drag((60, row(12)), (90, row(12)))
+    folded.drag(start, end)
     check(folded, before, "--light", tmp_path)
     click(folded, 8)
 

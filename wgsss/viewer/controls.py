@@ -71,10 +71,16 @@ def turn_light(light: Light, camera: Camera, right: float, up: float, centre: An
     return _moved(light, centre, lambda v: _turned(_turned(v, upright, TURN * right), across, -TURN * up))
 
 
+def towards(light: Any, centre: Any) -> Array:
+    """The unit vector from `centre` to a light."""
+    arm = np.negative(light.direction) if isinstance(light, DirectionalLight) else np.subtract(light.position, centre)
+    found: Array = arm / (np.linalg.norm(arm) or 1.0)
+    return found
+
+
 def bearing(light: Light, centre: Any) -> tuple[float, float]:
     """Where a light shines from, seen from `centre`, as of `PerspectiveCamera.orbit`: azimuth, elevation, degrees."""
-    towards = _towards(light, centre)
-    x, y, z = towards / (np.linalg.norm(towards) or 1.0)
+    x, y, z = towards(light, centre)
     return math.degrees(math.atan2(x, z)), math.degrees(math.asin(np.clip(y, -1.0, 1.0)))
 
 
@@ -112,11 +118,6 @@ def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:
     """Where a point, world mm, is in the picture: -1 to 1 across and up."""
     clip = camera.projection(aspect, 1.0, 2.0) @ camera.view() @ np.append(point, 1.0)
     return float(clip[0] / clip[3]), float(clip[1] / clip[3])
-
-
-def _towards(light: Any, centre: Any) -> Array:
-    """From `centre` to a light."""
-    return -np.asarray(light.direction) if isinstance(light, DirectionalLight) else np.subtract(light.position, centre)
 
 
 def _moved(light: Any, centre: Any, turned: Callable[[Array], Array]) -> Any:
