@@ -68,6 +68,20 @@ def test_it_is_coarse_while_things_move_and_in_full_once_they_are_still(
     assert right(painter).tobytes() == wanted.tobytes()
 
 
+def test_the_pool_is_of_what_is_shown(painter: Painter, state: State) -> None:
+    def pooled() -> int:
+        assert painter.paint(state, SIZE)
+        return sum(map(len, painter.gpu._free.values()))
+
+    painter.gpu.trim()
+    few = pooled()
+    state.methods[0] = make_method("texture+none")
+    many = pooled()
+    assert many > few
+    state.methods[0] = make_method("lambert")
+    assert pooled() < many
+
+
 @pytest.fixture
 def module(painter: Painter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A shader that may be broken."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
-from wgsss.methods import Method
+from wgsss.methods import Method, name_of
 from wgsss.reference import REFERENCES, Integral
 from wgsss.viewer.measure import Measured, measure
 from wgsss.viewer.pace import STILL_S, Pace
@@ -46,6 +46,8 @@ class Painter:
         """the view that was drawn last, how finely, and with which reference"""
         self._last_known: Known | None = None
         self._changed_s = -1.0
+        self._pooled: Any = None
+        """the methods and the size that the device's pool is for"""
 
     def reread(self) -> bool:
         """Whether shaders have changed: all is drawn anew then."""
@@ -66,8 +68,10 @@ class Painter:
         last = None if self._drawn is None else self._drawn[0]
         if view != last:
             self._changed_s = now
-        if last is not None and view[-1] != last[-1]:
-            self.gpu.trim()  # or pictures of every size that the window had would be kept
+        pooled = [name_of(method) for method in state.methods], full
+        if pooled != self._pooled:
+            self.gpu.trim()  # or what pictures of all earlier methods and sizes needed would be kept
+            self._pooled = pooled
         moving = state.playing or (last is not None and now - self._changed_s < STILL_S)
         scale = self.pace.scale if moving else 1.0
         known = None if moving else self._known(state, full)

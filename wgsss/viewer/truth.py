@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 from dataclasses import dataclass
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,6 +39,8 @@ class Known:
 SHARES = (0.25, 0.5, 1.0)
 """of the picture's sides, one after the other"""
 
+GONE = "the process that estimates references has ended"
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -59,6 +63,9 @@ class Truth:
         self._found: Estimate | None = None
         self._process: Any = None
         self._pipe: Any = None
+        self._wanted: SimpleQueue[tuple[int, View]] = SimpleQueue()
+        self._number = 0
+        """of the view that was asked for last"""
         self.share = 0.0
         """of the picture's sides that the estimate has; 0: there is none yet"""
         self.fault = ""
@@ -68,9 +75,13 @@ class Truth:
         """What is known of a view by now, at its size."""
         if not view.same(self._view):
             self._ask(view)
-        while self._pipe.poll():
-            asked, share, found = self._pipe.recv()
-            if asked != id(self._view):
+        while not self.fault and self._pipe.poll():
+            try:
+                asked, share, found = self._pipe.recv()
+            except (EOFError, OSError):
+                self.fault = GONE
+                break
+            if asked != self._number:
                 continue
             if isinstance(found, str):
                 self.fault = found
@@ -94,8 +105,24 @@ class Truth:
             self._pipe, theirs = context.Pipe()
             self._process = context.Process(target=_work, args=(theirs,), daemon=True)
             self._process.start()
+            theirs.close()  # so that its end is noticed
+            self._wanted = SimpleQueue()
+            Thread(target=_tell, args=(self._pipe, self._wanted), daemon=True).start()
         self._view, self._found, self.share, self.fault = view, None, 0.0, ""
-        self._pipe.send((id(view), view))
+        self._number += 1
+        self._wanted.put((self._number, view))
+
+
+def _tell(pipe: Any, wanted: SimpleQueue[tuple[int, View]]) -> None:
+    """Tell the process what is wanted: it listens between estimates, and a window cannot wait so long."""
+    while True:
+        asked = wanted.get()
+        while not wanted.empty():
+            asked = wanted.get()
+        try:
+            pipe.send(asked)
+        except OSError:
+            return
 
 
 def _work(pipe: Any) -> None:

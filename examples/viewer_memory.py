@@ -1,0 +1,100 @@
+"""How much memory the viewer holds while it is used: the window is orbited and switched through all methods.
+
+python examples/viewer_memory.py ear --minutes 10      # needs a display, such as that of xvfb-run
+
+A round shows every method and pair once, on the left, against the one before it on the right; each is orbited, then
+left alone until it is drawn in full. What the first round bakes and compiles stays, so that growth is told from there.
+"""
+
+import argparse
+import math
+import time
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+from wgsss.errors import InputError
+from wgsss.gpu import default_gpu
+from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method
+from wgsss.viewer.state import Source, State
+from wgsss.viewer.window import Window, loop
+
+NAMES = *METHODS, *(f"{surface}+{part}" for surface, part in product(SURFACES, ("none", *TRANSLUCENCIES)))
+TICK_S = 1 / 60
+
+
+def resident() -> float:
+    """Memory of this process that is not swapped out, MiB (Linux)."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 2**20
+
+
+def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
+    """Move the pointer by one step at a time; "round" once all methods have been shown."""
+    left, _, across, down = window.region
+    number = 0
+    while True:
+        for name in NAMES:
+            window.state.methods[1] = window.state.methods[0]
+            try:
+                window.change_method(0, make_method(name))
+            except InputError:  # two that do not go together
+                continue
+            point(window, "pointer_down", left + 0.25 * across, 0.5 * down)
+            start = time.perf_counter()
+            while time.perf_counter() - start < orbit_s:
+                number += 1
+                angle = 0.1 * number
+                x, y = 0.25 + 0.2 * math.cos(angle), 0.5 + 0.1 * math.sin(angle)
+                point(window, "pointer_move", left + x * across, y * down)
+                yield ""
+            point(window, "pointer_up", left + 0.25 * across, 0.5 * down)
+            start = time.perf_counter()
+            while time.perf_counter() - start < still_s or not window.painter.is_done(window.state, window.full_size):
+                yield ""
+        yield "round"
+
+
+def point(window: Window, kind: str, x: float, y: float) -> None:
+    window.canvas.submit_event({"event_type": kind, "x": x, "y": y, "button": 1, "buttons": (1,), "modifiers": ()})
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    add = parser.add_argument
+    add("scene", nargs="?", default="ear", help="a built-in scene")
+    add("--vertices", type=int)
+    add("--minutes", type=float, default=10.0, help="after the first round")
+    add("--orbit", type=float, default=2.0, help="seconds that each method is orbited")
+    add("--still", type=float, default=0.5, help="seconds that it is left alone")
+    add("--size", type=int, nargs=2, default=(960, 540), help="of the window")
+    args = parser.parse_args(argv)
+
+    state = State.open(Source(args.scene, vertices=args.vertices), [make_method("lambert"), make_method("lambert")])
+    window = Window(state, default_gpu(), tuple(args.size))
+    steps = hand(window, args.orbit, args.still)
+    frames: list[str] = []
+    rounds: list[tuple[float, float]] = []
+    """seconds and MiB at the end of each"""
+    started = time.perf_counter()
+    print("round  minutes  frames  MiB     grown")
+
+    def step() -> None:
+        now = time.perf_counter()
+        if next(steps) == "round":
+            rounds.append((now, resident()))
+            minutes, held = (now - started) / 60.0, rounds[-1][1]
+            grown = 100.0 * (held / rounds[0][1] - 1.0)
+            print(f"{len(rounds):5}  {minutes:7.2f}  {len(frames):6}  {held:6.1f}  {grown:5.2f} %", flush=True)
+        if rounds and now - rounds[0][0] > 60.0 * args.minutes:
+            window.canvas.close()
+        else:
+            loop().call_later(TICK_S, step)
+
+    window.canvas.add_event_handler(lambda event: frames.append(""), "before_draw")
+    loop().call_later(TICK_S, step)
+    window.run()
+
+
+if __name__ == "__main__":
+    main()
