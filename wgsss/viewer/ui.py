@@ -113,11 +113,11 @@ class Ui:
         if kind != "pointer_up" and len(event["buttons"]) <= (kind == "pointer_down"):
             self._is_ours = self._has_popup or event["x"] < self._width()
         event["stop_propagation"] = self._is_ours
-        self._wake(FRAMES if kind == "pointer_move" else self._owed + FRAMES)
+        self._wake(self._owed + FRAMES if self._is_ours and kind != "pointer_move" else FRAMES)
 
     def _on_key(self, event: Any) -> None:
         self._io.want_capture_keyboard |= self._has_keys
-        self._wake(self._owed + FRAMES)
+        self._wake(self._owed + FRAMES if self._io.want_capture_keyboard else FRAMES)
 
     def _keep_key(self, event: Any) -> None:
         """The renderer passes on keys that Dear ImGui has no name for, such as a point that is typed."""
