@@ -67,6 +67,8 @@ class Trail:
 
     def bench(self, state: State) -> list[Run]:
         """The runs of the last bench of the scene, as of its own camera, on this adapter; empty where there is none."""
+        if not (FOLDER / FILE).exists():
+            return []
         lit = state.scene.objects, state.scene.lights
         if lit != self._bench[0]:
             self._bench = lit, _last_bench(digest(replace(state.opened, objects=lit[0], lights=lit[1])))
@@ -90,8 +92,6 @@ def _view(state: State, size: tuple[int, int]) -> Any:
 
 
 def _last_bench(seen: str) -> list[Run]:
-    if not (FOLDER / FILE).exists():
-        return []
     try:
         runs = [run for run in read(FOLDER) if run["digest"] == seen and run["adapter"] == adapter()]
     except InputError:
