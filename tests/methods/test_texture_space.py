@@ -119,7 +119,7 @@ def test_edge_on_a_material_with_variances_of_its_own_per_channel(gpu):
 
 
 def diffused_map(gpu, scene, monkeypatch, map_size=512):
-    """M_front over the atlas, all of its Gaussians on maps of one size; the body and its charts."""
+    """M_front over the atlas, all of its Gaussians on maps of one size; the render mesh and its charts."""
     monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)
     stage = Stage(gpu, scene)
     method = TextureSpace(map_size=map_size)
@@ -132,7 +132,7 @@ def diffused_map(gpu, scene, monkeypatch, map_size=512):
     M = frame.lighting.unit * sum(
         graph.read(m)[..., :3].astype(float) * w for m, w in zip(maps, SKIN_GAUSSIANS.weights, strict=True)
     )
-    return M, body, texture_space.atlas(body, map_size)
+    return M, body.unwrap(), texture_space.atlas(body, map_size)
 
 
 @pytest.mark.parametrize(
@@ -153,8 +153,7 @@ def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
 
     mesh = sphere(20.0, 4000)
     scene = lit(DirectionalLight((-0.7, -0.5, -0.5), (1, 1, 1)), mesh=mesh, material=SKIN)
-    M, body, charts = diffused_map(gpu, scene, monkeypatch)
-    surface = body.unwrap()
+    M, surface, charts = diffused_map(gpu, scene, monkeypatch)
     ids = gpu.read_texture(charts.ids)[..., 0]
     inside = ids >= 1 << 31
     jumps = []
