@@ -82,6 +82,23 @@ def test_the_pool_is_of_what_is_shown(painter: Painter, state: State) -> None:
     assert pooled() < many
 
 
+def test_what_the_device_holds_does_not_grow_with_frames_and_switches(painter: Painter, state: State) -> None:
+    gpu = painter.gpu
+    painter.pace = Pace(budget_s=1e9)
+
+    def held_after_a_round() -> list[int]:
+        for name in ("texture+none", "screen+none", "lambert"):
+            state.methods[0] = make_method(name)
+            for _ in range(3):
+                turn(state)
+                assert painter.paint(state, SIZE)
+        stage = painter.easel.stage(state.scene, state.methods)
+        return [len(x) for x in (gpu._pipelines, gpu._shaders, gpu._views, stage._shared)]
+
+    held_after_a_round()
+    assert held_after_a_round() == held_after_a_round()
+
+
 @pytest.fixture
 def module(painter: Painter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A shader that may be broken."""
