@@ -10,6 +10,11 @@ import numpy as np
 import pytest
 from desk import CUT, DIVIDER, LEFT, RIGHT, SMALL, WINDOW, Desk, desk, missing, pictures, shown
 
+from wgsss.methods import METHODS
+
+METHOD = 60, 186
+"""the left side's method in the panel; of what it opens, the first is 25 pixels below, and each 18 below another"""
+
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"a window needs {missing()}")
 
 
@@ -92,6 +97,18 @@ def test_a_resize_draws_at_the_new_size(window: Desk) -> None:
     right = window.drawn(RIGHT)
     cut = CUT + 2
     window.settled(lambda pixels: np.array_equal(pictures(pixels)[:, cut:], right[:, cut:]))
+
+
+def test_a_method_is_chosen_in_the_panel(window: Desk) -> None:
+    before = window.drawn(LEFT)
+    window.do("mousemove", *METHOD, "click", 1)
+    window.settled()
+    window.do("mousemove", METHOD[0], METHOD[1] + 25 + 18 * list(METHODS).index("barre11"), "click", 1)
+    window.settled(lambda screen: not np.array_equal(pictures(screen)[:, : CUT - 2], before[:, : CUT - 2]))
+    command = window.copied(LEFT)
+    assert command[command.index("--method") + 1] == "barre11"
+    chosen = window.drawn(LEFT)
+    window.settled(lambda screen: np.array_equal(pictures(screen)[:, : CUT - 2], chosen[:, : CUT - 2]))
 
 
 def test_q_closes_it(tmp_path: Path) -> None:
