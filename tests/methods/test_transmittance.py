@@ -93,11 +93,14 @@ def test_a_plate_lit_straight_from_behind(gpu, thickness):
     np.testing.assert_allclose(M, np.broadcast_to(expected, M.shape), rtol=0.01, atol=1e-3)
 
 
+@pytest.mark.parametrize("far", [0.0, 300.0])
 @pytest.mark.parametrize("angle", [20, 50, 70])
-def test_a_plate_lit_aslant(gpu, angle):
+def test_a_plate_lit_aslant(gpu, angle, far):
+    """However large shadow texels are: something far away makes them so."""
     a = np.radians(angle)
     light = DirectionalLight((np.sin(a), np.cos(a), 0), (1, 1, 1))
-    M = through(gpu, lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE))
+    beside = (Object(plane(side=4.0, y=-3.0), MATTE, translate=(0, 0, far)),) if far else ()
+    M = through(gpu, lit(light, mesh=plate(6.0), material=WIDE, camera=ABOVE, extra=beside))
     found = thickness_by(M, 0.3 + np.cos(a))
     np.testing.assert_allclose(found, depth_in_a_plate(6.0, np.cos(a)), atol=3 * TEXEL / np.cos(a))
     assert np.ptp(found) < 1e-3 * found.mean(), "no grain"
@@ -175,9 +178,10 @@ def test_rays_are_taken_below_by_shadow_texels_that_grow_with_distance(gpu):
     way = floor_points() - light.position
     distance = np.linalg.norm(way, axis=-1, keepdims=True)
     cosine = -way[..., 1:2] / distance
-    shrink = 2 * np.sqrt(1 - cosine**2) * (2 / 2048 * distance) + RADIUS * (1 - cosine**2)
+    texels, grazing = 2 * np.sqrt(1 - cosine**2) * (2 / 2048 * distance), RADIUS * (1 - cosine**2)
+    shrink = texels + grazing
     lowered = np.linalg.norm(way - shrink * [0, 1, 0], axis=-1, keepdims=True)
-    expected = lowered * shrink / (15 + shrink) - shrink * cosine
+    expected = lowered * shrink / (15 + shrink) + texels / 0.3 - grazing * cosine
     E = (0.3 - cosine) / (distance / 1000) ** 2
     on = ((expected < 17) & (cosine < 0.29))[..., 0]
     assert on.sum() > 100

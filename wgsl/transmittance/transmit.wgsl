@@ -61,8 +61,11 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
     let texel = first.texel * select(1.0, at.distance, perspective);
     let cosine = dot(n, at.direction);
     let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    let shrink = SHRINK_TEXELS * texel * sine + params.shrink * sine * sine;
-    let x = x_o - n * shrink;
+    let below = SHRINK_TEXELS * texel * sine;
+    let grazing = params.shrink * sine * sine;
+    let x = x_o - n * (below + grazing);
+    // What the light has no longer to go. Of the texels all of it, or thickness would depend on the size of the map.
+    let spared = below / max(-cosine, WRAP) - grazing * cosine;
     let layer = layer_towards(light, x - light.position);
     let to_clip = views[layer].world_to_clip;
     let clip = to_clip * vec4f(x, 1.0);
@@ -86,7 +89,7 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
             let met = textureLoad(shadow_maps, there, layer, 0);
             let parallel = (here - met) * per_depth;
             let found = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
-            total += across[i] * along[j] * clamp(found - shrink * cosine, 0.0, params.reach);
+            total += across[i] * along[j] * clamp(found + spared, 0.0, params.reach);
         }
     }
     return total;
