@@ -12,8 +12,6 @@ from wgsss.viewer.state import COMPARISONS, LEFT, RIGHT
 if TYPE_CHECKING:
     from wgsss.viewer.window import Window
 
-STEP_S = 1 / 25
-"""of time, by the key"""
 KEY_STEP = 0.03
 """heights of the picture that an arrow key drags"""
 _ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
@@ -34,12 +32,6 @@ def _acts(window: Window) -> dict[str, Callable[[], Any]]:
     """What other keys do."""
     state, pointer = window.state, window.pointer
 
-    def play() -> None:
-        state.playing = not state.playing
-
-    def step() -> None:
-        state.time_s += STEP_S
-
     def compare(comparison: str) -> None:
         state.comparison = comparison
 
@@ -53,8 +45,8 @@ def _acts(window: Window) -> dict[str, Callable[[], Any]]:
         "+": lambda: pointer.zoom(1.1),
         "=": lambda: pointer.zoom(1.1),
         "-": lambda: pointer.zoom(1 / 1.1),
-        " ": play,
-        ".": step,
+        " ": state.play_or_pause,
+        ".": state.step,
         **{str(i + 1): partial(compare, comparison) for i, comparison in enumerate(COMPARISONS)},
         "Tab": lambda: compare(LEFT if state.comparison == RIGHT else RIGHT),
         "x": state.methods.reverse,

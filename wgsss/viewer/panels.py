@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from wgsss.methods import name_of
 from wgsss.viewer import chart, costs, knobs, lamps, media
 from wgsss.viewer.costs import SIDES
-from wgsss.viewer.keys import STEP_S
 from wgsss.viewer.pictures import LAYERS
 from wgsss.viewer.state import COMPARISONS, SPLIT
 
@@ -138,13 +137,7 @@ def _time(window: Window) -> None:
 
     state = window.state
 
-    def play() -> None:
-        state.playing = not state.playing
-
-    def step() -> None:
-        state.time_s += STEP_S
-
-    _row(window, {"pause" if state.playing else "play": play, "step": step})
+    _row(window, {"pause" if state.playing else "play": state.play_or_pause, "step": state.step})
     changed, seconds = imgui.drag_float("seconds", state.time_s, 0.02, 0.0, 1e4, "%.2f")
     if changed:
         state.time_s = max(knobs.shortened(seconds), 0.0)

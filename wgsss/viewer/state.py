@@ -16,6 +16,8 @@ from wgsss.scene.scenefile import CAMERAS, LIGHTS
 
 SPLIT, LEFT, RIGHT, ERROR = COMPARISONS = ("split", "left", "right", "error")
 """both beside the divider, one of the two, or how far they are from each other"""
+STEP_S = 1 / 25
+"""of time, at once"""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,13 @@ class State:
     def reset(self) -> None:
         """Camera and lights as they were."""
         self.scene = replace(self.scene, camera=self.opened.camera, lights=self.opened.lights)
+
+    def play_or_pause(self) -> None:
+        self.playing = not self.playing
+
+    def step(self) -> None:
+        """A little later."""
+        self.time_s += STEP_S
 
     def command(self, side: int, size: tuple[int, int]) -> str:
         """The command line that draws a side as it is shown, its layer aside."""
