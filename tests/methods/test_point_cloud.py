@@ -293,3 +293,20 @@ def test_the_spacing_is_of_the_middle_channels_path():
     np.testing.assert_allclose(mean_free_path(MATERIALS["marble"]), 1 / (2.62 + 0.0041))
     skin = MATERIALS["skin"]
     np.testing.assert_allclose(skin.profile.enclosed(mean_free_path(skin))[1], 0.5, atol=1e-6)
+
+
+def test_bodies_of_one_mesh_have_a_sky_each(gpu):
+    """Of two balls the left one is below a roof: it is lit as where the other is of another mesh, with the same
+    vertices."""
+    ball = sphere(radius=3.0, vertices=800)
+    open_ = Object(ball, MARBLE, translate=(5, 0, 0))
+    roof = Object(plane(side=8.0, y=4.0), MARBLE, translate=(-5, 0, 0))
+
+    def M(hidden):
+        objects = open_, Object(hidden, MARBLE, translate=(-5, 0, 0)), roof
+        return Passes(gpu, replace(lit(WHITE_SKY, camera=replace(FRONT, height=18)), objects=objects))
+
+    shared_mesh, apart = M(ball), M(Mesh(ball.positions, ball.faces))
+    left = apart.position[:, 0] < 0
+    assert apart.M[left].mean() < 0.9 * apart.M[~left].mean()
+    np.testing.assert_allclose(shared_mesh.M, apart.M, rtol=1e-3, atol=1e-3)

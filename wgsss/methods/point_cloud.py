@@ -148,15 +148,15 @@ class PointCloud:
         return body.stage.shared(("heights", id(cloud)), make)
 
     def _posed(self, body: Body) -> Posed:
-        """A body's samples as posed, on the device. Of a moving one only the last pose is kept."""
+        """A body's samples as posed, on the device. Of a moving one only the last pose is kept. Bodies of one mesh do
+        not share them: others hide other parts of the sky from each."""
         cloud, stage = self.cloud(body), body.stage
-        if body.rest.motion is None:
-            return stage.shared(("posed", id(body.rest.mesh), cloud.spacing), lambda: posed(body, cloud))
         last: dict[float, Posed] = stage.shared(("posed", body.index, cloud.spacing), dict)
-        if stage.time_s not in last:
+        time_s = 0.0 if body.rest.motion is None else stage.time_s
+        if time_s not in last:
             last.clear()
-            last[stage.time_s] = posed(body, cloud)
-        return last[stage.time_s]
+            last[time_s] = posed(body, cloud)
+        return last[time_s]
 
 
 def mean_free_path(material: Material) -> float:
