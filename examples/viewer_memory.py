@@ -3,19 +3,21 @@
 python examples/viewer_memory.py ear --minutes 10      # needs a display, such as that of xvfb-run
 
 A round shows every method and pair once, on the left, against the one before it on the right; each is orbited, then
-left alone until it is drawn in full. What the first round bakes and compiles stays, so that growth is told from there.
+left alone until it is drawn in full. What the first round bakes and compiles stays, so that growth is told from there;
+it draws at every resolution, since drivers compile for each that textures have.
 """
 
 import argparse
 import math
 import time
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product, repeat
 from pathlib import Path
 
 from wgsss.errors import InputError
 from wgsss.gpu import default_gpu
 from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method
+from wgsss.viewer.pace import SCALES
 from wgsss.viewer.state import Source, State
 from wgsss.viewer.window import Window, loop
 
@@ -33,7 +35,15 @@ def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
     """Move the pointer by one step at a time; "round" once all methods have been shown."""
     left, _, across, down = window.region
     number = 0
-    while True:
+
+    def move() -> None:
+        nonlocal number
+        number += 1
+        angle = 0.1 * number
+        x, y = 0.25 + 0.2 * math.cos(angle), 0.5 + 0.1 * math.sin(angle)
+        point(window, "pointer_move", left + x * across, y * down)
+
+    for first in chain([True], repeat(False)):
         for name in NAMES:
             window.state.methods[1] = window.state.methods[0]
             try:
@@ -41,12 +51,14 @@ def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
             except InputError:  # two that do not go together
                 continue
             point(window, "pointer_down", left + 0.25 * across, 0.5 * down)
+            for level, scale in enumerate(SCALES if first else ()):
+                while window.painter.scale != scale:
+                    window.painter.pace.step = level
+                    move()
+                    yield ""
             start = time.perf_counter()
             while time.perf_counter() - start < orbit_s:
-                number += 1
-                angle = 0.1 * number
-                x, y = 0.25 + 0.2 * math.cos(angle), 0.5 + 0.1 * math.sin(angle)
-                point(window, "pointer_move", left + x * across, y * down)
+                move()
                 yield ""
             point(window, "pointer_up", left + 0.25 * across, 0.5 * down)
             start = time.perf_counter()
