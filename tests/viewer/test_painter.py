@@ -68,6 +68,20 @@ def test_it_is_coarse_while_things_move_and_in_full_once_they_are_still(
     assert right(painter).tobytes() == wanted.tobytes()
 
 
+def test_what_moved_in_full_is_measured_once_it_is_still(
+    painter: Painter, state: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    monkeypatch.setattr(time, "perf_counter", lambda: now)
+    painter.pace = Pace(budget_s=1e9)
+    painter.paint(state, SIZE)
+    turn(state)
+    assert painter.paint(state, SIZE) and painter.scale == 1.0 and painter.measured is None
+    assert not painter.is_done(state, SIZE)
+    now += 0.3
+    assert painter.paint(state, SIZE) and painter.measured is not None and painter.is_done(state, SIZE)
+
+
 def test_the_pool_is_of_what_is_shown(painter: Painter, state: State) -> None:
     def pooled() -> int:
         assert painter.paint(state, SIZE)

@@ -43,7 +43,8 @@ class Painter:
         self.present: list[Method] = []
         """the methods that the last drawing was asked of"""
         self._drawn: Any = None
-        """the view that was drawn last, how finely, and with which reference"""
+        """the view that was drawn last, how finely, with which reference, and whether it moved: then nothing was
+        measured"""
         self._last_known: Known | None = None
         self._changed_s = -1.0
         self._pooled: Any = None
@@ -58,7 +59,7 @@ class Painter:
 
     def is_done(self, state: State, size: tuple[int, int]) -> bool:
         """Whether the pictures are of the state as it is, in full."""
-        return self._drawn is not None and self._drawn[:2] == (_view(state, size), 1.0)
+        return self._drawn is not None and (*self._drawn[:2], self._drawn[3]) == (_view(state, size), 1.0, False)
 
     def paint(self, state: State, full: tuple[int, int]) -> bool:
         """Draw what is not drawn yet, at most at a size in pixels; whether there is something new."""
@@ -82,7 +83,7 @@ class Painter:
         size = max(int(full[0] * scale), 1), max(int(full[1] * scale), 1)
         methods = [known if _is_reference(m) else m for m in state.methods]
         self.present = [m for m in methods if m is not None]
-        self._drawn = view, scale, known
+        self._drawn = view, scale, known, moving
         try:
             self.drawing = self.easel.draw(
                 state.scene, self.present, size, state.time_s, state.layer, timed=scale == 1.0
