@@ -42,7 +42,7 @@ KNOBS: dict[str, dict[str, Any]] = {
 VARIANTS = {f"sam-{select}": ("sam", {"select": select, "surface": "screen"}) for select in SELECTIONS}
 DRAWN = [*product(SCENES, METHODS), *product(("ear", "wave"), VARIANTS)]
 # On the screen, light spreads over less than a pixel, or nothing shines through what is thick.
-BELOW_PIXELS = {("crowd", "sam"), ("crowd", "jimenez15"), ("crowd", "barre11"), ("sphere", "barre11")}
+BELOW_PIXELS = {*(("crowd", method) for method in ("barre11", "jensen02", "jimenez15", "sam")), ("sphere", "barre11")}
 TIME_S = 0.7  # what moves is not at rest
 
 ADAPTER = "wgsss.adapter"  # the label of a golden that tells what drew it
