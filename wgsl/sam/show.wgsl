@@ -1,6 +1,7 @@
 // M_back at the pixels: that at the vertices, between them.
 
 import package::mesh::{Vertex, Surface, color_after};
+import package::screen::{is_hidden};
 import package::targets::{RGBA32Float};
 
 struct Params {
@@ -14,8 +15,6 @@ struct Params {
 @group(0) @binding(4) var where_seen: texture_2d<f32>;
 @group(0) @binding(5) var base_color: texture_2d<f32>;
 @group(0) @binding(6) var depth: texture_depth_2d;
-
-const SAME: f32 = 1e-5; // depths that differ by less are of one surface
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -36,8 +35,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 @fragment
 fn fs(in: Varying) -> Pixel {
     let texel = vec2u(in.clip.xy);
-    let hidden = in.clip.z > textureLoad(depth, texel, 0) + SAME;
-    if hidden || u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if is_hidden(in.clip, depth) || u32(textureLoad(where_seen, texel, 0).z) != surface.id {
         discard;
     }
     return Pixel(vec4f(in.M_back * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));

@@ -60,20 +60,23 @@ class ScreenSpace:
             raise unknown("kernel", self.kernel, tuple(KERNELS))
 
     def bake(self, stage: Stage) -> None:
-        """The taps of each material's kernel, unless the image decides on them."""
-        if self.taps:
-            for body in stage.bodies:
-                self.weights(body, self.taps)
+        """Each material's kernel. Its taps may depend on the image."""
+        for body in stage.bodies:
+            self._terms(body)
 
     def weights(self, body: Body, taps: int) -> list[tuple[Taps, Any]]:
         """The kernel of a body's material by so many taps, a term and its buffer for each pair of passes."""
 
         def make() -> list[tuple[Taps, Any]]:
-            terms = KERNELS[self.kernel](body.material.profile)
+            terms = self._terms(body)
             found = [Taps(term, terms[0], taps // 2) for term in terms]
             return [(t, t.upload(body.stage.gpu)) for t in found]
 
         return body.stage.shared(("separable", id(body.material), self.kernel, taps), make)
+
+    def _terms(self, body: Body) -> tuple[Term, ...]:
+        material = body.material
+        return body.stage.shared(("terms", id(material), self.kernel), lambda: KERNELS[self.kernel](material.profile))
 
     def passes(self, frame: Frame) -> Diffused:
         return Diffused(frame.once(self, lambda: self.diffuse(frame, shared.irradiance_pixels(frame))))
