@@ -150,6 +150,17 @@ def test_places_that_cannot_be_written_are_told_beforehand(tmp_path: Path, path:
     assert [found.name for found in tmp_path.iterdir()] == ["folder.png"]
 
 
+def test_an_interrupt_leaves_no_trial_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(path: Path) -> None:
+        open(path, "x").close()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "touch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        check_output(tmp_path / "a.png")
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_have_the_permissions_of_any_new_file(image: Image, tmp_path: Path) -> None:
     save(image, tmp_path / "a.png")
     subprocess.run(["touch", tmp_path / "b"], check=True)

@@ -46,8 +46,10 @@ def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
         if not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder '{path.parent}'")
         trial = _temporary(path)  # permissions do not tell everything, so try
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        try:
+            trial.touch()
+        finally:  # also where an interrupt comes in between
+            trial.unlink(missing_ok=True)
     return path
 
 
@@ -95,6 +97,11 @@ def save(image: Image, path: str | Path) -> list[Path]:
     path = check_output(path)
     if path.suffix.lower() == ".mp4":
         return [_save_video([image], path, DEFAULT_FPS)]
+    return _write(image, path)
+
+
+def _write(image: Image, path: Path) -> list[Path]:
+    """One frame, to a place that was checked."""
     layers = _layers(image)
     if path.suffix.lower() == ".npy":
         paths = [path, *(path.with_name(f"{path.stem}.{name}{path.suffix}") for name in layers)]
@@ -117,7 +124,7 @@ def save_frames(images: Iterable[Image], path: str | Path, fps: float = DEFAULT_
         return [_save_video(images, path, fps)]
     written: list[Path] = []
     for number, image in enumerate(images, start=1):
-        written += save(image, path.with_name(f"{path.stem}.{number:04d}{path.suffix}"))
+        written += _write(image, path.with_name(f"{path.stem}.{number:04d}{path.suffix}"))
     return written
 
 
