@@ -1,4 +1,8 @@
-"""Closed triangle meshes of implicit surfaces: marching cubes in a band about the surface, then relaxation on it."""
+"""Closed triangle meshes of implicit surfaces: marching cubes in a band about the surface, then relaxation on it.
+
+Fields are evaluated in double precision: processors round sines and the like differently, and positions in single
+precision would tell, at which unwrapping takes other turns.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +26,7 @@ def sample(field: Field, low: Point, high: Point, spacing: float, *, steepness: 
     origin = np.array([(a + b - n * _BLOCK * spacing) / 2 for a, b, n in zip(low, high, blocks, strict=True)])
     side = _BLOCK * spacing
     index = np.stack(np.meshgrid(*(np.arange(n) for n in blocks), indexing="ij"), axis=-1).reshape(-1, 3)
-    middle = (origin + (index + 0.5) * side).astype(np.float32)
+    middle = origin + (index + 0.5) * side
     there = field(middle[:, 0], middle[:, 1], middle[:, 2])
     # One cell more on every side, so that each lattice point on a block's border has its own near block to come from.
     near = np.abs(there) <= steepness * math.sqrt(3) * (side / 2 + spacing)
@@ -35,8 +39,8 @@ def sample(field: Field, low: Point, high: Point, spacing: float, *, steepness: 
     for d in cell:
         wanted[tuple((corner + d).T)] = True
     at = np.nonzero(wanted)
-    points = (origin + np.stack(at, axis=1) * spacing).astype(np.float32)
-    parts = np.array_split(points, len(points) // 200_000 + 1)  # to stay within the processor's caches
+    points = origin + np.stack(at, axis=1) * spacing
+    parts = np.array_split(points, len(points) // 100_000 + 1)  # to stay within the processor's caches
     values[at] = np.concatenate([field(*part.T.copy()) for part in parts])
     return values, origin
 
@@ -63,9 +67,9 @@ def extract(
 
 def onto(field: Field, positions: np.ndarray, spacing: float) -> np.ndarray:
     """Positions (V,3) moved onto the surface by one Newton step, of at most half the spacing."""
-    x, y, z = positions.astype(np.float32).T.copy()
+    x, y, z = positions.T.copy()
     here = field(x, y, z)
-    step = np.float32(0.1 * spacing)
+    step = 0.1 * spacing
     ahead = field(x + step, y, z), field(x, y + step, z), field(x, y, z + step)
     gradient = (np.stack(ahead, axis=1) - here[:, None]) / step
     move = -here / np.maximum((gradient**2).sum(axis=1), 0.1)
