@@ -1,8 +1,8 @@
 """Every built-in scene by every method, against the picture in goldens/ that was looked at and found right.
 
-A golden catches change, it does not measure accuracy. On the adapter, driver and kind of processor that drew it, at most
-0.1 % of pixels differ by more than 1 of 255 in any channel; on another, the pictures look alike by FLIP. What fails is
-left in out/goldens/: what was drawn, the difference, the golden.
+A golden catches change, it does not measure accuracy. On the adapter, driver and kind of processor that drew it, at
+most 0.1 % of pixels differ by more than 1 of 255 in any channel; on another, the pictures look alike by FLIP. What
+fails is left in out/goldens/: what was drawn, the difference, the golden.
 """
 
 from __future__ import annotations

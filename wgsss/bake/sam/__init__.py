@@ -22,6 +22,7 @@ from wgsss.bake.sam.nonnegative import nonnegative
 from wgsss.bake.sam.parts import Fans
 from wgsss.bake.sam.pursuit import pursue
 from wgsss.bake.sam.quick import QuickFormFactors
+from wgsss.bake.sam.refit import refit
 from wgsss.bake.sam.rows import senders
 from wgsss.bake.sam.soundness import concerns
 from wgsss.bake.sam.top import best, select_top
@@ -50,7 +51,7 @@ _CODE: dict[str, tuple[Any, ...]] = {
     "coarse": _TOP,
     "fit": (
         *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends", "sam/mix"),
-        *(QuickFormFactors, blend, mix, nonnegative, pursue, senders, training, tree),
+        *(QuickFormFactors, blend, mix, nonnegative, pursue, refit, senders, training, tree),
     ),
 }
 """What each selection depends on, beside the module that it is in."""
