@@ -7,7 +7,9 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import trimesh
 
 from wgsss.cli import main
 from wgsss.methods import METHODS
@@ -120,3 +122,21 @@ def test_bad_input_is_one_line(argv, says, done: list[Spec], monkeypatch: pytest
     out, err = run(capsys, *argv, code=2)
     assert out == "" and err.count("\n") == 1 and re.search(says, err), err
     assert not done
+
+
+def test_choices_are_those_of_every_scene(done: list[Spec], tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
+    seen: list[Scene] = []
+    fake = runs_of.measure
+    monkeypatch.setattr(runs_of, "measure", lambda scene, spec: (seen.append(scene), fake(scene, spec))[1])
+    cube = trimesh.creation.box()
+    cube.export(tmp_path / "cube.ply")
+    run(capsys, "cube.ply", "--methods", "lambert", "--material", "marble", "--size-mm", "80")
+    run(capsys, "slab", "sphere", "--methods", "lambert", "--material", "ketchup", "--vertices", "500")
+    assert [scene.objects[0].material.name for scene in seen] == ["marble", "ketchup", "ketchup"]
+    assert np.ptp(seen[0].objects[0].mesh.bounds, axis=0).max() == pytest.approx(80.0)
+    assert all(len(scene.objects[0].mesh.positions) < 700 for scene in seen)
+
+
+def test_the_table_is_of_the_scene_as_it_is(capsys):
+    _, err = run(capsys, "crowd", "--table", "speedup", "--material", "marble", code=2)
+    assert "as it is" in err and err.count("\n") == 1

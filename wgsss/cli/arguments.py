@@ -52,8 +52,13 @@ def command(commands: Any, name: str, run: Any, summary: str, **rest: Any) -> Pa
 
 def add_scene(parser: Parser) -> None:
     """The scene, and the choices that go with it."""
+    parser.add_argument("scene", metavar="SCENE", help=_SCENE)
+    add_scene_choices(parser)
+
+
+def add_scene_choices(parser: Parser) -> None:
+    """What may be other than a scene has it."""
     add = parser.add_argument
-    add("scene", metavar="SCENE", help=_SCENE)
     add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
     add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
@@ -70,12 +75,12 @@ def add_method(parser: Parser) -> None:
     add("--set", metavar="KNOB=VALUE", dest="knobs", type=assignment, action="append", default=[], help="set a knob")
 
 
-def load_scene(args: argparse.Namespace) -> Scene:
-    """The scene that the arguments name."""
+def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
+    """The scene that the arguments name, or another one, with their choices."""
     from wgsss.scene import load_scene
 
     return load_scene(
-        args.scene,
+        name or args.scene,
         material=args.material,
         size_mm=args.size_mm,
         vertices=args.vertices,

@@ -34,6 +34,7 @@ def declare(commands: Any) -> None:
     parser = arguments.command(commands, "bench", run, "chart speed against accuracy, for all methods over their knobs")
     add = parser.add_argument
     add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
+    arguments.add_scene_choices(parser)
     add("--methods", metavar="NAME,NAME,…", type=arguments.names, help="default: all (see 'wgsss methods')")
     add("--reference", metavar="NAME", default="integral", help="what errors are measured against (default: integral)")
     add("--table", metavar="NAME", choices=TABLES, help=_TABLE)
@@ -49,9 +50,7 @@ def run(args: Any) -> None:
     from wgsss.study.chart import draw
 
     if args.scenes:
-        from wgsss.scene import load_scene
-
-        scenes = [load_scene(name) for name in dict.fromkeys(args.scenes)]
+        scenes = [arguments.load_scene(args, name) for name in dict.fromkeys(args.scenes)]
         runs = bench(
             scenes,
             args.methods,
@@ -72,6 +71,8 @@ def _speedup(args: Any) -> None:
 
     if args.scenes != ["crowd"]:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
+    if any((args.material, args.size_mm, args.vertices, args.camera, args.light)):
+        raise InputError("the table speedup is of the scene crowd as it is: no --material and the like")
     if args.methods or args.scheduler:
         raise InputError("the table speedup is of two methods, measured here: no --methods and no --scheduler")
     table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)
