@@ -25,7 +25,7 @@ from wgsss.scene import DirectionalLight, load_scene
 from wgsss.stage import Stage
 
 TURN, SECONDS, SETTLED = 40.0, 1.0, 0.2
-MAPS = (("top", 3), ("top", 8), ("top", 20), ("fit", 3), ("fit", 8))
+MAPS = tuple((select, samples) for select in ("top", "fit") for samples in (3, 8, 20))
 
 
 def flicker(M: np.ndarray) -> float:
