@@ -79,7 +79,7 @@ def test_sam_tessellation(script: Callable[..., list[list[str]]]) -> None:
 
 def test_sam_flicker(script: Callable[..., list[list[str]]]) -> None:
     rows = script("sam_flicker", "wave", *TINY, "--rate", "8")
-    assert [row[0] for row in rows[1:]] == ["all", "top", "top", "top", "fit", "fit"]
+    assert [row[0] for row in rows[1:]] == ["all", "top", "top", "top", "fit", "fit", "fit"]
     assert all(float(row[6]) < float(row[2]) for row in rows[2:]), "what is blended flickers less"
 
 

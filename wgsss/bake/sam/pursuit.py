@@ -12,7 +12,9 @@ from wgsss.bake.sam.nonnegative import nonnegative
 Array = npt.NDArray[Any]
 
 ROUNDS = 2
-"""times that each choice is made once more: a quarter to a third less error at three choices, a fifth at eight"""
+"""times that each choice is made once more; of the worst triples, one in two is then the best that there is"""
+_OWN = 0.01
+"""of a candidate's square, at least, that counts as not told by the other choices: less is rounding"""
 
 
 def pursue(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
@@ -26,53 +28,62 @@ def pursue(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
         int64 (B, P, n), of the candidates, different ones where there are as many, and float32 (B, P, n, 3), their
         weights: at least 0, and 0 where a candidate adds nothing.
 
-    They are chosen for the sum of the channels, each by how much of what is left it can take; then each choice is made
-    anew, the others being known, ROUNDS times. The weights are each channel's own.
+    They are chosen for the sum of the channels, each by how much it lessens the error if the weights of the others
+    follow (orthogonal least squares, Chen, Billings & Luo 1989); then each choice is made anew, the others being known,
+    ROUNDS times. The weights are each channel's own.
     """
     (B, C, T), P = seen.shape, response.shape[2]
+    rows, count = B * P, min(n, C)
     problem = np.repeat(np.arange(B), P)
-    goal = response.sum(axis=1).reshape(B * P, T)
-    inverse = (1.0 / np.maximum(np.einsum("bct,bct->bc", seen, seen), 1e-30))[:, None]
-    count = min(n, C)
-    chosen = np.zeros((B * P, count), np.int64)
-    support = np.zeros((B * P, count, T), np.float32)
-    gram = np.zeros((B * P, count, count), np.float32)
-    moment, weight = np.zeros((2, B * P, count, 1), np.float32)
+    across = seen.transpose(0, 2, 1)
+    goal = response.sum(axis=1)
+    wanted = (goal @ across).reshape(rows, C)
+    square = np.einsum("bct,bct->bc", seen, seen)[problem] + np.float32(1e-30)
+    chosen = np.zeros((rows, count), np.int64)
+    product = np.zeros((rows, count, C), np.float32)
+    """of what was chosen with all candidates"""
 
-    def best(left: Array, others: Array) -> Array:
-        score = np.maximum(left.reshape(B, P, T) @ seen.transpose(0, 2, 1), 0.0)
+    def best(others: Array) -> Array:
+        """The candidate (rows,) that adds most to what was chosen in some of the places."""
+        there, by = chosen[:, others], product[:, others]
+        left, own = wanted, square
+        if len(others):
+            weight, gram, _ = fitted(there, by)
+            left = wanted - (weight[:, None] @ by)[:, 0]
+            damped = gram + 1e-6 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(len(others))
+            told = np.linalg.inv(damped + 1e-30 * np.eye(len(others))).astype(np.float32) @ by
+            told *= by
+            own = np.maximum(square - told.sum(axis=1), _OWN * square)
+        score = np.maximum(left, 0.0)
         score *= score
-        score *= inverse
-        np.put_along_axis(score, others.reshape(B, P, -1), -1.0, axis=2)
-        return score.argmax(axis=2).ravel()
+        score /= own
+        np.put_along_axis(score, there, -1.0, axis=1)
+        return score.argmax(axis=1)
 
-    left = goal
+    def fitted(there: Array, by: Array) -> tuple[Array, Array, Array]:
+        """Weights (rows, k) of choices, their products with each other, and by how much they lessen the error."""
+        gram = np.take_along_axis(by, np.broadcast_to(there[:, None], (*there.shape, there.shape[1])), axis=2)
+        moment = np.take_along_axis(wanted, there, axis=1)
+        weight = nonnegative(gram, moment[..., None])[..., 0]
+        gain = 2.0 * (weight * moment).sum(axis=1) - np.einsum("ri,rij,rj->r", weight, gram, weight)
+        return weight, gram, gain
+
+    def products(which: Array) -> Array:
+        return (seen[problem, which].reshape(B, P, T) @ across).reshape(rows, C)
+
     for k in range(count):
-        chosen[:, k] = best(left, chosen[:, :k])
-        support[:, k] = seen[problem, chosen[:, k]]
-        some = slice(0, k + 1)
-        gram[:, some, k] = gram[:, k, some] = (support[:, some] @ support[:, k, :, None])[..., 0]
-        moment[:, k] = np.einsum("rt,rt->r", support[:, k], goal)[:, None]
-        weight[:, some] = nonnegative(gram[:, some, some], moment[:, some])
-        left = goal - (weight[:, some].transpose(0, 2, 1) @ support[:, some])[:, 0]
+        chosen[:, k] = best(np.arange(k))
+        product[:, k] = products(chosen[:, k])
+    gain = fitted(chosen, product)[2]
     for k in ROUNDS * list(range(count)) if count > 1 else ():
-        # The others keep their weights meanwhile: were they to take over, what is left would ask for the same again.
-        other = best(left + weight[:, k] * support[:, k], np.delete(chosen, k, axis=1))
-        rows = np.flatnonzero(other != chosen[:, k])
-        if not len(rows):
-            continue
-        s, g, m = support[rows], gram[rows], moment[rows]
-        s[:, k] = seen[problem[rows], other[rows]]
-        g[:, :, k] = g[:, k] = (s @ s[:, k, :, None])[..., 0]
-        m[:, k] = np.einsum("rt,rt->r", s[:, k], goal[rows])[:, None]
-        w = nonnegative(g, m)
-        rest = goal[rows] - (w.transpose(0, 2, 1) @ s)[:, 0]
-        better = np.einsum("rt,rt->r", rest, rest) < np.einsum("rt,rt->r", left[rows], left[rows])
-        rows = rows[better]
-        chosen[rows, k] = other[rows]
-        support[rows], gram[rows], moment[rows], weight[rows] = s[better], g[better], m[better], w[better]
-        left[rows] = rest[better]
-    of_channels = response.transpose(0, 2, 3, 1).reshape(B * P, T, 3)
-    weights = nonnegative(gram, support @ of_channels)
+        other = best(np.delete(np.arange(count), k))
+        there, by = chosen.copy(), product.copy()
+        there[:, k], by[:, k] = other, products(other)
+        now = fitted(there, by)[2]
+        better = (now > gain) & (other != chosen[:, k])
+        chosen[better], product[better], gain[better] = there[better], by[better], now[better]
+    support = seen[problem[:, None], chosen]
+    of_channels = response.transpose(0, 2, 3, 1).reshape(rows, T, 3)
+    weights = nonnegative(fitted(chosen, product)[1], support @ of_channels)
     missing = ((0, 0), (0, 0), (0, n - count))
     return np.pad(chosen.reshape(B, P, count), missing), np.pad(weights.reshape(B, P, count, 3), (*missing, (0, 0)))
