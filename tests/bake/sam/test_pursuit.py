@@ -51,6 +51,21 @@ def test_choices_are_nearly_the_best_pairs_and_never_negative():
     assert np.median(ratios) < 1.01 and np.mean(ratios) < 1.3
 
 
+def test_triples_of_candidates_that_are_much_alike():
+    """Means over parts of a surface overlap: what a candidate adds is not what it alone would tell."""
+    rng = np.random.default_rng(5)
+    x = np.linspace(0.0, 1.0, 60)
+    width = rng.choice([0.05, 0.15, 0.4], 24)
+    seen = np.exp(-np.square((x - rng.random(24)[:, None]) / width[:, None])) + 0.3
+    response = np.repeat((rng.random((20, 24)) ** 6 @ seen)[..., None], 3, axis=2)
+    chosen, weight = pursue(*problem(seen, response), 3)
+    ratios = []
+    for p in range(20):
+        best = min(best_of(seen, response[p], triple) for triple in combinations(range(24), 3))
+        ratios.append(error(seen, response[p], chosen[0, p], weight[0, p]) / best)
+    assert np.median(ratios) < 1.02 and np.mean(ratios) < 1.5
+
+
 @pytest.mark.parametrize("n", [2, 3])
 def test_weights_are_the_best_of_their_support(n):
     """Among candidates that are alike, least squares alone would make weights negative."""
