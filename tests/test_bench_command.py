@@ -106,6 +106,7 @@ def test_ctrl_c_keeps_what_is_done(done: list[Spec], monkeypatch: pytest.MonkeyP
     ("argv", "says"),
     [
         ([], r"bench/runs.jsonl: cannot be read \(No such file"),
+        (["--material", "marble"], "without a scene"),
         (["eer"], "unknown scene 'eer'; did you mean 'ear'"),
         (["slab", "--methods", "lambrt"], "unknown method 'lambrt'; did you mean 'lambert'"),
         (["slab", "--methods", "lambert,"], "'lambert,' is not a list of names"),

@@ -66,6 +66,11 @@ def add_scene_choices(parser: Parser) -> None:
     add("--light", metavar="TABLE", type=table_of, action="append", default=[], help=_LIGHT)
 
 
+def has_scene_choices(args: argparse.Namespace) -> bool:
+    """Whether anything is to be other than a scene has it."""
+    return any((args.material, args.size_mm, args.vertices, args.camera, args.light))
+
+
 def add_method(parser: Parser) -> None:
     """The method, and its knobs."""
     add = parser.add_argument

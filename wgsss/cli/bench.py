@@ -61,6 +61,8 @@ def run(args: Any) -> None:
             tell=_tell,
         )
     else:
+        if arguments.has_scene_choices(args):
+            raise InputError("without a scene there is nothing to measure: no --material and the like")
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
     arguments.tell(args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *files]))
@@ -71,7 +73,7 @@ def _speedup(args: Any) -> None:
 
     if args.scenes != ["crowd"]:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
-    if any((args.material, args.size_mm, args.vertices, args.camera, args.light)):
+    if arguments.has_scene_choices(args):
         raise InputError("the table speedup is of the scene crowd as it is: no --material and the like")
     if args.methods or args.scheduler:
         raise InputError("the table speedup is of two methods, measured here: no --methods and no --scheduler")
