@@ -92,7 +92,7 @@ def bake(scene: Scene, samples: int, select: str) -> tuple[float, float, int]:
     _ = body.mesh.normals  # a part of loading
     gpu, wall, cpu = default_gpu(), time.perf_counter(), time.process_time()
     entries = spatial_adjacency_map(gpu, body.mesh, body.material.profile, samples, select)
-    return time.perf_counter() - wall, time.process_time() - cpu, entries.bytes_per_vertex
+    return time.perf_counter() - wall, time.process_time() - cpu, entries.bytes // len(body.mesh.positions)
 
 
 if __name__ == "__main__":

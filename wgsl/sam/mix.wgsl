@@ -1,10 +1,10 @@
-// M_back at the vertices as mixtures of what they and their neighbours gathered.
+// M_back at the vertices as mixtures of what their entries and those of their neighbours gathered.
 
-const NEIGHBOURS: u32 = 7u;
+const ROWS: u32 = 7u;
 
 struct Mix {
-    vertex: array<u32, NEIGHBOURS>,
-    halves: array<u32, 5>, // two each: a weight for each vertex, and the tint
+    row: array<u32, ROWS>,
+    halves: array<u32, 5>, // two each: a weight for each row, and the tint
 }
 
 @group(0) @binding(0) var<storage, read> vertices: array<u32>; // those that have entries
@@ -18,8 +18,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     var M = vec3f(0.0);
-    for (var k = 0u; k < NEIGHBOURS; k++) {
-        M += unpack2x16float(mixes[id.x].halves[k / 2u])[k % 2u] * gathered[mixes[id.x].vertex[k]].rgb;
+    for (var k = 0u; k < ROWS; k++) {
+        M += unpack2x16float(mixes[id.x].halves[k / 2u])[k % 2u] * gathered[mixes[id.x].row[k]].rgb;
     }
     M *= vec3f(unpack2x16float(mixes[id.x].halves[3]).y, unpack2x16float(mixes[id.x].halves[4]));
     M_back[vertices[id.x]] = vec4f(M, 1.0);

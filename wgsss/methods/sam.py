@@ -91,8 +91,9 @@ class Adjacency:
     def at_vertices(self, frame: Frame, body: Body, plan: Plan) -> Handle:
         """M_back, W/m^2, at the vertices of a body's mesh, without what `color_after` leaves of the base colour."""
         graph, stage = frame.graph, body.stage
-        V, samples = plan.entries.sender.shape
-        last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(np.zeros((V, 4), np.float32))))
+        rows, samples = plan.entries.sender.shape
+        zero = np.zeros((rows, 4), np.float32)
+        last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(zero)))
         passed = last.passed(stage.time_s)
         points = _points(body, plan)
         kept = KEPT_A_SECOND**passed if passed > 0.0 else 0.0
@@ -119,21 +120,21 @@ class Adjacency:
         for block, of_block in zip(plan.blocks, entries, strict=True):
             M_back = graph.dispatch(
                 "sam/gather",
-                size=V if M_back is None else block.count,
+                size=rows if M_back is None else block.count,
                 params=params,
-                vertices=block.vertices,
+                rows=block.rows,
                 entries=of_block,
                 irradiance=irradiance,
                 last=last.M_back,
                 **({} if M_back is None else {"M_back": M_back}),
             )
         gathered, mixed = M_back, None
-        for block in plan.blocks if plan.entries.mix else ():
+        for part in plan.mixes:
             mixed = graph.dispatch(
                 "sam/mix",
-                size=V if mixed is None else block.count,
-                vertices=block.vertices,
-                mixes=block.mixes,
+                size=len(body.rest.mesh.positions) if mixed is None else part.count,
+                vertices=part.vertices,
+                mixes=part.mixes,
                 gathered=gathered,
                 **({} if mixed is None else {"M_back": mixed}),
             )
@@ -174,7 +175,7 @@ class Last:
     """M_back of the frame before."""
 
     M_back: Any
-    """buffer of vec4f, one for each vertex"""
+    """buffer of vec4f, one for each row of entries, of which each vertex has one"""
     time_s: float | None = None
 
     def passed(self, time_s: float) -> float:

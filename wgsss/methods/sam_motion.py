@@ -172,7 +172,7 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
             "sam/update",
             size=(block.count, entries.sender.shape[1]),
             params=params,
-            vertices=block.vertices,
+            vertices=block.rows,
             at_rest=block.entries,
             moved=block.moved,
             places=places,

@@ -3,6 +3,7 @@ the nodes of a tree of senders."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,15 +29,25 @@ class Block:
     """As many entries as fit in a binding, on the device."""
 
     count: int
-    """of the vertices that they belong to"""
-    vertices: Any
+    """of the rows that they are in"""
+    rows: Any
     """buffer of u32: those"""
     entries: Any
     """buffer of array<Entry> (wgsl/sam/entries.wgsl)"""
     moved: Any
     """buffer of i32: the senders that they have, from frame to frame, where they may change"""
+
+
+@dataclass(frozen=True, eq=False)
+class Mixes:
+    """As many mixtures as fit in a binding, on the device."""
+
+    count: int
+    """of the vertices that they belong to"""
+    vertices: Any
+    """buffer of u32: those"""
     mixes: Any
-    """buffer of array<Mix> (wgsl/sam/mix.wgsl), where there is a mix"""
+    """buffer of array<Mix> (wgsl/sam/mix.wgsl)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +60,8 @@ class Plan:
     blocks: list[Block]
     faces: Any
     """buffer of u32: the corners of the faces that receive"""
+    mixes: list[Mixes]
+    """where there is a mix"""
     starts: Any = None
     """buffer of u32, where there is a tree: where the senders of the finest nodes begin in `order`, and the end"""
     order: Any = None
@@ -70,9 +83,9 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
     Where it is `moving`, all senders count, since entries may come to read others; receivers that are no senders follow
     them among the points.
     """
-    receives = entries.sender.max(axis=1) >= 0
-    vertices, tree = np.flatnonzero(receives), entries.tree
-    if not len(vertices):
+    gathers, V = entries.sender.max(axis=1) >= 0, len(mesh.positions)
+    rows, receives, tree = np.flatnonzero(gathers), gathers[:V], entries.tree
+    if not len(rows):
         return None
     needed = np.arange(entries.senders) if moving else _needed(entries)
     samples = at_vertices(mesh) if entries.samples is None else entries.samples
@@ -83,16 +96,18 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
     places = np.full(entries.senders, -1, np.int32)
     places[needed] = np.arange(len(needed))
     named = np.concatenate([places, len(points.face) + np.arange(means), [-1]])  # of no sender, -1, is the last
-    blocks = _blocks(gpu, vertices, named[entries.sender[vertices]], entries)
+    blocks = _blocks(gpu, rows, named[entries.sender[rows]], entries.weight[rows])
     corners = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
+    mixes = [] if entries.mix is None else _mixes(gpu, rows[rows < V], entries.mix)
     if tree is None:
-        return Plan(entries, points, blocks, corners)
+        return Plan(entries, points, blocks, corners, mixes)
     finest = tree.first[: tree.levels[1]]
     return Plan(
         entries,
         points,
         blocks,
         corners,
+        mixes,
         gpu.buffer(np.append(finest, len(tree.order)).astype(np.uint32)),
         gpu.buffer(np.maximum(places[tree.order], 0).astype(np.uint32)),  # what is not needed is in no mean that is
         gpu.buffer(fan_areas(mesh)[needed].astype(np.float32)),
@@ -128,29 +143,34 @@ def _needed(entries: Entries) -> Array:
     return np.flatnonzero(is_read)
 
 
-def _blocks(gpu: Gpu, vertices: Array, sender: Array, entries: Entries) -> list[Block]:
+def _blocks(gpu: Gpu, rows: Array, sender: Array, weight: Array) -> list[Block]:
     layout = wgsl.load("sam/gather").layout("array<Entry>")
-    most = LIMITS["max-storage-buffer-binding-size"] // max(BYTES * sender.shape[1], MIX_BYTES)
-    found = []
-    for first in range(0, len(vertices), most):
-        some = slice(first, first + most)
-        weight = entries.weight[vertices[some]].reshape(-1, 3)
-        found.append(
-            Block(
-                len(vertices[some]),
-                gpu.buffer(vertices[some].astype(np.uint32)),
-                gpu.buffer(layout.pack({"weight": weight, "sender": sender[some].ravel()})),
-                gpu.buffer(sender[some].astype(np.int32)),
-                None if entries.mix is None else _mixes(gpu, entries.mix, vertices[some]),
-            )
+    return [
+        Block(
+            len(rows[some]),
+            gpu.buffer(rows[some].astype(np.uint32)),
+            gpu.buffer(layout.pack({"weight": weight[some].reshape(-1, 3), "sender": sender[some].ravel()})),
+            gpu.buffer(sender[some].astype(np.int32)),
         )
+        for some in _bindings(len(rows), BYTES * sender.shape[1])
+    ]
+
+
+def _mixes(gpu: Gpu, vertices: Array, mix: Mix) -> list[Mixes]:
+    layout = wgsl.load("sam/mix").layout("array<Mix>")
+    found = []
+    for some in _bindings(len(vertices), MIX_BYTES):
+        v = vertices[some]
+        halves = np.concatenate([mix.weight[v], mix.tint[v]], axis=1).view(np.uint32)
+        packed = layout.pack({"row": mix.row[v], "halves": halves})
+        found.append(Mixes(len(v), gpu.buffer(v.astype(np.uint32)), gpu.buffer(packed)))
     return found
 
 
-def _mixes(gpu: Gpu, mix: Mix, vertices: Array) -> Any:
-    layout = wgsl.load("sam/mix").layout("array<Mix>")
-    halves = np.concatenate([mix.weight[vertices], mix.tint[vertices]], axis=1)
-    return gpu.buffer(layout.pack({"vertex": mix.vertex[vertices], "halves": halves.view(np.uint32)}))
+def _bindings(count: int, size: int) -> Iterator[slice]:
+    """Of things of so many bytes, those that go into one binding each."""
+    most = LIMITS["max-storage-buffer-binding-size"] // size
+    return (slice(first, first + most) for first in range(0, count, most))
 
 
 def _blends(gpu: Gpu, blend: Blend) -> Any:

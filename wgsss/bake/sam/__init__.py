@@ -20,6 +20,7 @@ from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.mix import MIX_BYTES, mix
 from wgsss.bake.sam.nonnegative import nonnegative
 from wgsss.bake.sam.parts import Fans
+from wgsss.bake.sam.patches import Patches
 from wgsss.bake.sam.pursuit import pursue
 from wgsss.bake.sam.quick import QuickFormFactors
 from wgsss.bake.sam.refit import refit
@@ -51,7 +52,7 @@ _CODE: dict[str, tuple[Any, ...]] = {
     "coarse": _TOP,
     "fit": (
         *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends", "sam/mix"),
-        *(QuickFormFactors, blend, mix, nonnegative, pursue, refit, senders, training, tree),
+        *(QuickFormFactors, blend, mix, nonnegative, Patches, pursue, refit, senders, training, tree),
     ),
 }
 """What each selection depends on, beside the module that it is in."""

@@ -24,15 +24,17 @@ BYTES = 16
 class Entries:
     """M_back at each of V vertices as a sum of n products (000 eq. 12): `weight` times what `sender` receives, L_d.
 
+    Row v of `sender` and `weight` is that of vertex v. Any beyond are only read by the mixtures of a `mix`.
+
     A sender is a vertex, or one of `samples`; or, where there is a `tree`, a node: the mean over the vertices below it,
     weighted by the areas of their fans; where there is a `blend`, one of its means over such means. Where there is a
-    `mix`, the sum is what a vertex gathers, and M_back a mixture of that.
+    `mix`, the sum is what a row gathers, and M_back a mixture of that.
     """
 
     sender: Array
-    """int32 (V, n): below `senders` a vertex or a sample, else node or blend `sender - senders`; -1 where none is"""
+    """int32 (R, n): below `senders` a vertex or a sample, else node or blend `sender - senders`; -1 where none is"""
     weight: Array
-    """float32 (V, n, 3), without unit; 0 where there is no sender"""
+    """float32 (R, n, 3), without unit; 0 where there is no sender"""
     senders: int
     """V, or the number of samples"""
     samples: Samples | None = None
@@ -41,8 +43,8 @@ class Entries:
     mix: Mix | None = None
 
     @property
-    def bytes_per_vertex(self) -> int:
-        return BYTES * self.sender.shape[1] + (MIX_BYTES if self.mix else 0)
+    def bytes(self) -> int:
+        return BYTES * self.sender.size + (MIX_BYTES * len(self.mix.row) if self.mix else 0)
 
     def arrays(self) -> Arrays:
         """All of it by name, as the cache keeps it."""
@@ -63,6 +65,12 @@ class Entries:
         return cls(arrays["sender"], arrays["weight"], int(arrays["senders"]), samples, tree, blend, mix)
 
 
-def empty(vertices: int, n: int) -> tuple[Array, Array]:
+def empty(rows: int, n: int) -> tuple[Array, Array]:
     """Senders and weights of entries that are not there."""
-    return np.full((vertices, n), -1, np.int32), np.zeros((vertices, n, 3), np.float32)
+    return np.full((rows, n), -1, np.int32), np.zeros((rows, n, 3), np.float32)
+
+
+def gathered(sender: Array, weight: Array, light: Array) -> Array:
+    """What rows (k, n) gather, float32 (k, T), in all channels together, where senders have `light` (S, T); its last
+    row is that of no sender."""
+    return np.asarray((weight.sum(axis=2)[:, None] @ light[sender])[:, 0])

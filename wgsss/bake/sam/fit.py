@@ -1,36 +1,40 @@
 """`fit`: of all that reaches a vertex from behind, the few means by which its M_back is told best, whatever shines.
 
 What an entry may read is the irradiance at a vertex, or a blended mean over nodes of a tree. Each vertex's exact
-response to a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it. Where
-neighbours choose other ones, mixtures of what they gather come nearer still.
+response to a set of irradiances is known; matching pursuit finds the senders and weights that come nearest to it. Most
+of the error is that of few vertices, near which there are many senders, each in light or in shadow: they have a second
+row of entries. Where neighbours choose other ones, mixtures of what they gather come nearer still.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from wgsss.bake.sam.blend import WIDTHS, Blend, blend
-from wgsss.bake.sam.entries import Entries
-from wgsss.bake.sam.mix import mix, weigh
+from wgsss.bake.sam.blend import Blend, blend
+from wgsss.bake.sam.entries import Entries, empty, gathered
+from wgsss.bake.sam.mix import in_blocks, mix, weigh
+from wgsss.bake.sam.patches import Patches, candidates
 from wgsss.bake.sam.pursuit import pursue
 from wgsss.bake.sam.quick import QuickFormFactors
 from wgsss.bake.sam.refit import refit
-from wgsss.bake.sam.rows import Array, Senders, reaching, senders
+from wgsss.bake.sam.rows import Senders, senders
 from wgsss.bake.sam.training import compressed, training
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 
-DRAWS = 32
-"""equal shares of a vertex's form factors: what holds the middle of one is a candidate, as are all nodes above it"""
-PATCH = 1
-"""level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
+Array = npt.NDArray[Any]
+
+SECOND = 32
+"""of how many receivers one has a second row, the one that is told worst: a fifth to a half off the error"""
 FAINTEST = 1e-3
 """share of what a plane would give back, below which nothing shines through to a vertex"""
 COUNTED = 256
@@ -39,64 +43,92 @@ REFITS = 3
 """times that entries are refitted to how they are mixed, and mixed anew: a tenth to a fifth off the error"""
 AT_ONCE = 256
 """patches of a thread's task"""
-_BLOCK = 4_000_000  # numbers that a batch of patches holds at a time, about
 
 
 def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
-    """The `n` senders of each vertex, and their weights, whose sum is nearest to its response to `training`."""
+    """The `n` senders of each vertex, and of some twice as many, and their weights, whose sum is nearest to its
+    response to `training`."""
     from threadpoolctl import threadpool_limits
-    from tqdm import tqdm
 
     V = len(mesh.positions)
     K = QuickFormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
     means = blend(s.tree, s.x[V:], s.n[V:], s.area[V:])
     light = _lights(s, means, compressed(training(mesh), s.area[:V]))
-    sender, weight = np.full((V, n), -1, np.int32), np.zeros((V, n, 3), np.float32)
+    sender, weight = empty(V, n)
     responses, total = np.zeros((V, light.shape[1]), np.float32), np.zeros((V, 3), np.float32)
 
-    def fit(patches: Array) -> int:
-        for vertices, reached in _batches(s, K, patches, light.shape[1]):
-            k = K(s, vertices, reached)
-            candidates = _candidates(s, k.sum(axis=1), reached)
-            B, _, P, C = k.shape
-            response = (k.reshape(B, 3 * P, C) @ light[reached]).reshape(B, 3, P, -1)
-            chosen, w = pursue(light[candidates], response, n)
-            there = vertices >= 0
-            found = np.take_along_axis(candidates, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
-            sender[vertices[there]], weight[vertices[there]] = found[there], w[there]
-            responses[vertices[there]] = response.sum(axis=1)[there]
-            total[vertices[there]] = k.sum(axis=3).transpose(0, 2, 1)[there]
-        return len(patches)
+    def first(patches: Patches) -> None:
+        for some, found, w, response, k in _pursued(s, K, light, patches, n):
+            sender[some], weight[some], responses[some], total[some] = found, w, response, k
 
-    def gathered(vertices: Array) -> Array:
-        return (weight[vertices].sum(axis=2)[:, None] @ light[sender[vertices]])[:, 0]
+    def second(patches: Patches) -> None:
+        for some, found, w, _, _ in _pursued(s, K, light, patches, 2 * n):
+            sender[some], weight[some] = found[:, :n], w[:, :n]
+            sender[row[some]], weight[row[some]] = found[:, n:], w[:, n:]
 
-    levels = s.tree.levels
-    level = min(PATCH, len(levels) - 2)
-    patches = np.arange(levels[level], levels[level + 1])
-    some = [patches[i : i + AT_ONCE] for i in range(0, len(patches), AT_ONCE)]
+    def gather(rows: Array) -> Array:
+        return gathered(sender[rows], weight[rows], light)
+
     # Threads of ours: products of many small matrices are no work for those of a BLAS.
-    with (
-        tqdm(total=len(patches), desc=f"fitting {n} senders", unit=" patches", file=sys.stderr, disable=None) as bar,
-        threadpool_limits(1, "blas"),
-        ThreadPoolExecutor(os.cpu_count()) as pool,
-    ):
-        for done in pool.map(fit, some):
-            bar.update(done)
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
+        _run(pool, first, Patches.of(s, np.arange(V)), f"fitting {n} senders")
         weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
+        receivers = np.flatnonzero(weight.any(axis=(1, 2)))
+        twice = _worst(receivers, gather, responses)
+        row = np.full(V, -1)
+        row[twice] = V + np.arange(len(twice))
+        owner = np.concatenate([np.arange(V), twice])
+        sender, weight = (np.concatenate(pair) for pair in zip((sender, weight), empty(len(twice), n), strict=True))
+        _run(pool, second, Patches.of(s, twice), f"fitting {2 * n} senders")
         sender[~weight.any(axis=2)] = -1
         total *= _missed(s, K, total)
-        receivers = np.flatnonzero(weight.any(axis=(1, 2)))
-        mixed = mix(mesh.positions, mesh.normals, float(np.sqrt(s.area[:V].mean())), receivers, gathered, responses)
+        rows = np.flatnonzero(weight.any(axis=(1, 2)))
+        mixed = mix(mesh.positions, mesh.normals, float(np.sqrt(s.area[:V].mean())), owner, rows, gather, responses)
         for _ in range(REFITS if len(receivers) else 0):
-            refit(mixed, receivers, sender, weight, light, responses)
-            weigh(mixed, receivers, gathered, responses)
+            refit(mixed, receivers, rows, sender, weight, light, responses)
+            weigh(mixed, receivers, gather, responses)
         mixed.colour(weight.sum(axis=1), total)
     is_mean = sender >= V
     used, at = np.unique(sender[is_mean] - len(s.area), return_inverse=True)
     sender[is_mean] = V + at
     return Entries(sender, weight, V, tree=s.tree, blend=means.only(used), mix=mixed)
+
+
+def _run(pool: ThreadPoolExecutor, fit: Callable[[Patches], None], patches: Patches, label: str) -> None:
+    """Fit some patches at a time, on all cores."""
+    from tqdm import tqdm
+
+    parts = patches.split(AT_ONCE)
+    with tqdm(total=len(patches.node), desc=label, unit=" patches", file=sys.stderr, disable=None) as bar:
+        for part, _ in zip(parts, pool.map(fit, parts), strict=True):
+            bar.update(len(part.node))
+
+
+def _pursued(s: Senders, K: QuickFormFactors, light: Array, patches: Patches, n: int) -> Iterator[tuple[Array, ...]]:
+    """Vertices (k,) with their `n` senders and weights, their responses (k, T) to `light` (V + N + U + 1, T), in all
+    channels together, and (k, 3) to even light."""
+    for vertices, reached in patches.batches(s, K, light.shape[1]):
+        k = K(s, vertices, reached)
+        among = candidates(s, k.sum(axis=1), reached)
+        B, _, P, C = k.shape
+        response = (k.reshape(B, 3 * P, C) @ light[reached]).reshape(B, 3, P, -1)
+        chosen, w = pursue(light[among], response, n)
+        found = np.take_along_axis(among, chosen.reshape(B, -1), axis=1).reshape(chosen.shape)
+        there, even = vertices >= 0, k.sum(axis=3).transpose(0, 2, 1)
+        yield tuple(a[there] for a in (vertices, found, w, response.sum(axis=1), even))
+
+
+def _worst(receivers: Array, gather: Callable[[Array], Array], responses: Array) -> Array:
+    """One in SECOND of the receivers (k,), in ascending order: those whose responses (V, T) are missed by most."""
+    missed = np.zeros(len(responses))
+
+    def tell(some: Array) -> None:
+        missed[some] = np.square(responses[some] - gather(some)).sum(axis=1)
+
+    in_blocks(tell, receivers)
+    order = np.argsort(-missed[receivers], kind="stable")
+    return np.sort(receivers[order[: -(-len(receivers) // SECOND)]])
 
 
 def _missed(s: Senders, K: QuickFormFactors, total: Array) -> Array:
@@ -123,57 +155,6 @@ def _lights(s: Senders, means: Blend, lights: Array) -> Array:
             sums = sums.reshape(-1, 4, sums.shape[1]).sum(axis=1) if b - a > 1 else sums
         found[end:-1, some] = means.of(found[V:end, some])
     return found
-
-
-def _batches(s: Senders, K: QuickFormFactors, patches: Array, lights: int) -> Iterator[tuple[Array, Array]]:
-    """Patches, those last that much reaches: their vertices (B, P) and what reaches them (B, C); -1 fills up."""
-    made, V = s.tree, len(s.tree.order)
-    patch, reached = reaching(s, K, V + patches)
-    first, count = made.first[patches], made.count[patches]
-    start = np.searchsorted(patch, np.arange(len(patches) + 1))
-    size = np.diff(start)
-    order = np.argsort(size, kind="stable")
-    order = order[size[order] > 0]
-    P = int(count.max())
-    i = 0
-    while i < len(order):
-        j = i + 1
-        while j < len(order) and (j + 1 - i) * size[order[j]] * (lights + 12 * P) < _BLOCK:
-            j += 1
-        here = order[i:j]
-        yield _ranges(made.order, first[here], count[here]), _ranges(reached, start[here], size[here])
-        i = j
-
-
-def _ranges(values: Array, first: Array, count: Array) -> Array:
-    """Ranges of values side by side (B, longest), one wide at least, -1 beyond their ends."""
-    at = np.arange(max(int(count.max()), 1))
-    inside = at < count[:, None]
-    return np.append(values, -1)[np.where(inside, first[:, None] + at, -1)]
-
-
-def _candidates(s: Senders, k: Array, reached: Array) -> Array:
-    """Vertices and blended means (B, candidates) by form factors k (B, P, C), of all channels, of what reaches the
-    patches (B, C); -1 fills up."""
-    before = np.cumsum(k, axis=2)
-    before *= DRAWS / _positive(before[..., -1:])
-    share = np.floor(before + 0.5)
-    drawn = np.diff(share, axis=2, prepend=np.float32(0.0)) > 0.0
-    patch, column = np.nonzero(drawn.any(axis=1))
-    sender, all_ = reached[patch, column], len(s.area)
-    keys = [patch * all_ + sender]
-    while len(patch):
-        above = s.parent[sender]
-        key = np.unique((patch * all_ + above)[above >= 0])
-        patch, sender = key // all_, key % all_
-        keys.append(key)
-    patch, sender = np.divmod(np.unique(np.concatenate(keys)), all_)
-    start = np.searchsorted(patch, np.arange(len(k) + 1))
-    found = _ranges(sender, start[:-1], np.diff(start))
-    V, nodes = len(s.tree.order), all_ - len(s.tree.order)
-    is_mean = found >= V
-    wider = [np.where(is_mean, found + width * nodes, -1) for width in range(2, 1 + len(WIDTHS))]
-    return np.concatenate([np.where(is_mean, found + nodes, found), *wider], axis=1)
 
 
 def _positive(values: Array) -> Array:
