@@ -273,6 +273,14 @@ def test_maps_of_nodes_sum_all_that_is_behind(gpu, monkeypatch, apply):
         assert np.abs(found.M.mean(axis=0) / expected.mean(axis=0) - 1.0).max() < 0.01
 
 
+def test_what_is_summed_wants_no_senders_chosen(gpu, monkeypatch):
+    monkeypatch.setattr(sam, "spatial_adjacency_map", lambda *_: pytest.fail("senders were chosen"))
+    method = replace(PLAIN, select="fit")
+    thick = Stage(gpu, moving(sphere(60.0, 400), turn))
+    assert method.plan(thick.bodies[0]) is None, "nothing shines through"
+    assert Followed(Stage(gpu, moving(sphere(6.0, 400), turn)), 0.4, method).M.min() > 0.0
+
+
 def test_the_sum_is_blended_with_that_of_the_frame_before(gpu, monkeypatch):
     given(monkeypatch, random_entries)
     scene = moving(sphere(6.0, 400), twisted)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss.bake.sam import SELECTIONS, Entries, spatial_adjacency_map
+from wgsss.bake.sam import SELECTIONS, Entries, map_of_everything, spatial_adjacency_map
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.lambert import Lambert
@@ -56,10 +56,13 @@ class Adjacency:
 
     def map(self, body: Body) -> Entries:
         """The spatial adjacency map of a body at rest."""
-        mesh, stage = body.rest.mesh, body.stage
+        mesh, stage, profile = body.rest.mesh, body.stage, body.material.profile
+        key = ("sam", id(mesh), id(body.material))
+        if self.select == "fit" and body.rest.motion is not None:
+            return stage.shared(key, lambda: map_of_everything(stage.gpu, mesh, profile))
         return stage.shared(
-            ("sam", id(mesh), id(body.material), self.samples, self.select),
-            lambda: spatial_adjacency_map(stage.gpu, mesh, body.material.profile, self.samples, self.select),
+            (*key, self.samples, self.select),
+            lambda: spatial_adjacency_map(stage.gpu, mesh, profile, self.samples, self.select),
         )
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:

@@ -14,8 +14,9 @@ from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.bounds import Bounds
 from wgsss.bake.sam.coarse import select_coarse
 from wgsss.bake.sam.entries import BYTES, Entries
+from wgsss.bake.sam.everything import everything
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.fit import select_fit
+from wgsss.bake.sam.fit import SECOND, select_fit
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.mix import MIX_BYTES, mix
 from wgsss.bake.sam.nonnegative import nonnegative
@@ -34,7 +35,7 @@ from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 
-__all__ = ["SELECTIONS", "Entries", "spatial_adjacency_map"]
+__all__ = ["SELECTIONS", "Entries", "map_of_everything", "spatial_adjacency_map"]
 
 SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], Entries]] = {
     "top": select_top,
@@ -47,15 +48,14 @@ MOST_BYTES = 1 << 30
 """of the entries of a map"""
 _PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
 _TOP = (Entries, fan_areas, Fans, FormFactors, Blocks, Bounds, tree, best, "sam/form_factors", "sam/top")
+_QUICK = (Entries, fan_areas, Fans, FormFactors, QuickFormFactors, Patches, senders, tree, "sam/form_factors")
 _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,
-    "fit": (
-        *(Entries, fan_areas, Fans, FormFactors, "sam/form_factors", "sam/blends", "sam/mix"),
-        *(QuickFormFactors, blend, mix, nonnegative, Patches, pursue, refit, senders, training, tree),
-    ),
+    "fit": (*_QUICK, blend, mix, nonnegative, pursue, refit, training, "sam/blends", "sam/mix"),
+    "everything": (*_QUICK, select_fit),
 }
-"""What each selection depends on, beside the module that it is in."""
+"""What each depends on, beside the module that it is in."""
 
 
 def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, select: str) -> Entries:
@@ -69,19 +69,30 @@ def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, 
         raise unknown("selection", select, SELECTIONS)
     if samples < 1:
         raise InputError(f"{mesh.name}: a spatial adjacency map needs at least one sample, not {samples}")
-    size = (BYTES * samples + (MIX_BYTES if select == "fit" else 0)) * len(mesh.positions)
+    V, is_fit = len(mesh.positions), select == "fit"
+    size = BYTES * samples * (V + -(-V // SECOND) * is_fit) + MIX_BYTES * V * is_fit
     if size > MOST_BYTES:
         raise InputError(
-            f"{mesh.name}: {samples} samples for each of {len(mesh.positions)} vertices take {size} bytes, "
+            f"{mesh.name}: {samples} samples for each of {V} vertices take {size} bytes, "
             f"and a spatial adjacency map may have {MOST_BYTES}"
         )
+    return _cached(select, SELECTIONS[select], gpu, mesh, profile, samples)
 
+
+def map_of_everything(gpu: Gpu, mesh: Mesh, profile: Profile) -> Entries:
+    """A tree over all vertices of a mesh, and who receives anything from behind; cached. Warns as above."""
+    return _cached("everything", everything, gpu, mesh, profile)
+
+
+def _cached(
+    name: str, choose: Callable[..., Entries], gpu: Gpu, mesh: Mesh, profile: Profile, *samples: int
+) -> Entries:
     def make() -> Arrays:
         note = concerns(mesh)
-        return {**SELECTIONS[select](gpu, mesh, profile, samples).arrays(), "note": np.array(note)}
+        return {**choose(gpu, mesh, profile, *samples).arrays(), "note": np.array(note)}
 
-    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), samples, select]
-    found = cached("sam", [*key, gpu.name], make, code=(SELECTIONS[select], concerns, *_CODE[select]))
+    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), *samples]
+    found = cached("sam", [*key, name, gpu.name], make, code=(choose, concerns, *_CODE[name]))
     if note := str(found["note"]):
-        warnings.warn(f"{mesh.name}: {note}", stacklevel=2)
+        warnings.warn(f"{mesh.name}: {note}", stacklevel=3)
     return Entries.of(found)

@@ -8,10 +8,7 @@ row of entries. Where neighbours choose other ones, mixtures of what they gather
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any
 
@@ -41,8 +38,6 @@ COUNTED = 256
 """vertices at which all form factors are summed one by one, to tell what the tree misses"""
 REFITS = 3
 """times that entries are refitted to how they are mixed, and mixed anew: a tenth to a fifth off the error"""
-AT_ONCE = 256
-"""patches of a thread's task"""
 
 
 def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
@@ -70,9 +65,8 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     def gather(rows: Array) -> Array:
         return gathered(sender[rows], weight[rows], light)
 
-    # Threads of ours: products of many small matrices are no work for those of a BLAS.
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        _run(pool, first, Patches.of(s, np.arange(V)), f"fitting {n} senders")
+    Patches.of(s, np.arange(V)).each(first, f"fitting {n} senders")
+    with threadpool_limits(1, "blas"):
         weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
         receivers = np.flatnonzero(weight.any(axis=(1, 2)))
         twice = _worst(receivers, gather, responses)
@@ -80,7 +74,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
         row[twice] = V + np.arange(len(twice))
         owner = np.concatenate([np.arange(V), twice])
         sender, weight = (np.concatenate(pair) for pair in zip((sender, weight), empty(len(twice), n), strict=True))
-        _run(pool, second, Patches.of(s, twice), f"fitting {2 * n} senders")
+        Patches.of(s, twice).each(second, f"fitting {2 * n} senders")
         sender[~weight.any(axis=2)] = -1
         total *= _missed(s, K, total)
         rows = np.flatnonzero(weight.any(axis=(1, 2)))
@@ -93,16 +87,6 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     used, at = np.unique(sender[is_mean] - len(s.area), return_inverse=True)
     sender[is_mean] = V + at
     return Entries(sender, weight, V, tree=s.tree, blend=means.only(used), mix=mixed)
-
-
-def _run(pool: ThreadPoolExecutor, fit: Callable[[Patches], None], patches: Patches, label: str) -> None:
-    """Fit some patches at a time, on all cores."""
-    from tqdm import tqdm
-
-    parts = patches.split(AT_ONCE)
-    with tqdm(total=len(patches.node), desc=label, unit=" patches", file=sys.stderr, disable=None) as bar:
-        for part, _ in zip(parts, pool.map(fit, parts), strict=True):
-            bar.update(len(part.node))
 
 
 def _pursued(s: Senders, K: QuickFormFactors, light: Array, patches: Patches, n: int) -> Iterator[tuple[Array, ...]]:

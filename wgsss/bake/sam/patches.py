@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +22,7 @@ DRAWS = 32
 """equal shares of a vertex's form factors: what holds the middle of one is a candidate, as are all nodes above it"""
 PATCH = 1
 """level of the tree whose nodes, of 4 to 16 vertices, share candidates"""
+_AT_ONCE = 256  # patches of a thread's task
 _BLOCK = 4_000_000  # numbers that a batch of patches holds at a time, about
 
 
@@ -42,9 +46,20 @@ class Patches:
         node = np.searchsorted(s.tree.first[levels[level] : levels[level + 1]], leaf, side="right") - 1
         return cls(levels[level] + np.unique(node), leaf)
 
-    def split(self, at_once: int) -> list[Patches]:
-        """As many at once, each with all vertices."""
-        return [Patches(self.node[i : i + at_once], self.leaf) for i in range(0, len(self.node), at_once)]
+    def each(self, work: Callable[[Patches], None], label: str) -> None:
+        """Work on some at a time, on all cores."""
+        from threadpoolctl import threadpool_limits
+        from tqdm import tqdm
+
+        parts = [Patches(self.node[i : i + _AT_ONCE], self.leaf) for i in range(0, len(self.node), _AT_ONCE)]
+        # Threads of ours: products of many small matrices are no work for those of a BLAS.
+        with (
+            tqdm(total=len(self.node), desc=label, unit=" patches", file=sys.stderr, disable=None) as bar,
+            threadpool_limits(1, "blas"),
+            ThreadPoolExecutor(os.cpu_count()) as pool,
+        ):
+            for part, _ in zip(parts, pool.map(work, parts), strict=True):
+                bar.update(len(part.node))
 
     def batches(self, s: Senders, K: QuickFormFactors, lights: int) -> Iterator[tuple[Array, Array]]:
         """Those that much reaches last: their vertices (B, P) and what reaches them (B, C); -1 fills up."""
