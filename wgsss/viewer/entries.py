@@ -37,7 +37,7 @@ def adjacency(method: Method) -> Adjacency | None:
 
 
 def links(stage: Stage, maps: Adjacency, point: Any) -> Links:
-    """Those of the vertex nearest to a point, world mm."""
+    """Those of the vertex nearest to a point, world mm; of a mixture, those of all rows that are in it."""
 
     def nearest(index: int) -> tuple[float, int]:
         distance = np.linalg.norm(stage.scene.objects[index].placed - point, axis=1)
@@ -46,11 +46,16 @@ def links(stage: Stage, maps: Adjacency, point: Any) -> Links:
     index = min(range(len(stage.bodies)), key=lambda i: nearest(i)[0])
     body, vertex = stage.bodies[index], nearest(index)[1]
     entries, matrix = maps.map(body), body.rest.matrix
-    used = entries.sender[vertex] >= 0
-    sender = entries.sender[vertex][used]
+    rows, parts = np.array([vertex]), np.ones((1, 3))
+    if entries.mix is not None:
+        rows, parts = entries.mix.row[vertex], entries.mix.weight[vertex, :, None] * entries.mix.tint[vertex]
+    weight = (entries.weight[rows] * parts[:, None]).mean(axis=2)
+    used = weight > 0.0
+    sender, at_once = np.unique(entries.sender[rows][used], return_inverse=True)
+    weights = np.bincount(at_once.ravel(), weight[used], len(sender))
     if entries.blend is not None:  # of a blend, the node that it takes the place of
         node = entries.blend.node[np.maximum(sender - entries.senders, 0), 0]
         sender = np.where(sender < entries.senders, sender, entries.senders + node)
     places = stage.shared(("places", id(entries)), lambda: places_at_rest(body.rest.mesh, entries)["position"])
     at = places[sender] @ matrix[:3, :3].T + matrix[:3, 3]
-    return Links(body.rest.placed[vertex], at, entries.weight[vertex][used].mean(axis=1))
+    return Links(body.rest.placed[vertex], at, weights)

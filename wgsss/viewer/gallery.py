@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from wgsss.viewer.window import Window
 
 MARGIN, FONT_SIZE = 8.0, 13.0
+LABELLED = 0.25  # of the widest line: thinner ones have no number
 """round a text and of it, logical pixels"""
 
 
@@ -116,7 +117,8 @@ def _entries(behind: Any, window: Window) -> None:
     for place, weight in zip(found.senders, found.weights, strict=True):
         end, share = _on_screen(window, place), float(weight) / most
         behind.add_line(start, end, imgui.IM_COL32(90, 220, 255, 255), 1.0 + 4.0 * share)
-        behind.add_text(end, imgui.IM_COL32(255, 255, 255, 255), f"{weight:.3g}")
+        if share > LABELLED:
+            behind.add_text(end, imgui.IM_COL32(255, 255, 255, 255), f"{weight:.3g}")
     behind.add_circle_filled(start, 4.0, imgui.IM_COL32(255, 200, 60, 255))
 
 
