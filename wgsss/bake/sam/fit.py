@@ -78,6 +78,7 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
         sender[~weight.any(axis=2)] = -1
         total *= _missed(s, K, total)
         rows = np.flatnonzero(weight.any(axis=(1, 2)))
+        receivers = rows[rows < V]
         mixed = mix(mesh.positions, mesh.normals, float(np.sqrt(s.area[:V].mean())), owner, rows, gather, responses)
         for _ in range(REFITS if len(receivers) else 0):
             refit(mixed, receivers, rows, sender, weight, light, responses)
