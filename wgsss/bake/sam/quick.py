@@ -20,7 +20,7 @@ BEYOND = 5e-4
 """share of the light of a plane that comes from farther away than what is looked at"""
 TAIL = 1e-5
 """share of it that comes from farther away than what is known at all"""
-FAINT = 3e-3
+FAINT = 2e-3
 """share of what leaves a plane in all, below which a node is not looked into"""
 NEAREST = 3.0
 """roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
@@ -75,7 +75,7 @@ class QuickFormFactors:
         back &= product(n, s.n[senders]) < 0.0
         square = product(-2.0 * centre, far)
         square += own(centre, centre)[:, :, None]
-        square += (own(far, far) + s.extent[senders])[:, None]
+        square += own(far, far)[:, None]
         area = np.where(senders >= 0, s.area[senders], np.float32(0.0))[:, None]
         K = np.empty((len(back), 3, *back.shape[1:]), np.float32)
         entry, counted = self._entry(square), area * back

@@ -23,8 +23,6 @@ Array = npt.NDArray[Any]
 
 OPENING = 0.35
 """radius of a node over its distance, at most; the published criterion of the same kind (004 eq. 42) takes sizes"""
-WITHIN = 0.5
-"""of a node's mean squared extent, which counts as distance: R_d bends, so that all of it would be too much"""
 NEAR = 4.0
 """roots of a fan's area within which form factors are integrated; a fan is some 1.2 across"""
 ORDER = 2
@@ -41,8 +39,6 @@ class Senders:
     """(V + N, 3), mm: the vertices; of nodes the means, weighted by area"""
     centre: Array
     """(V + N, 3), mm: the centroids of fans"""
-    extent: Array
-    """(V + N,), mm^2: of nodes, what their extent adds to squared distances; 0 of vertices"""
     n: Array
     """(V + N, 3), unit: the direction of the mean normal"""
     area: Array
@@ -87,8 +83,6 @@ def senders(mesh: Mesh, spread: float) -> Senders:
     shares = area + 1e-12 * max(float(area.max()), 1e-30)
     weight = made.sums(shares)
     middle, centre, normal = (made.sums(v * shares[:, None]) / weight[:, None] for v in (x, fans.centre, n))
-    square = made.sums(np.square(fans.centre).sum(axis=1) * shares) / weight
-    extent = WITHIN * np.maximum(square - np.square(centre).sum(axis=1), 0.0)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     radius, cosine = np.zeros(len(weight)), np.ones(len(weight))
     for a, b in pairwise(made.levels):
@@ -97,8 +91,8 @@ def senders(mesh: Mesh, spread: float) -> Senders:
         radius[a:b] = np.maximum.reduceat(off, made.first[a:b])
         cosine[a:b] = np.minimum.reduceat(np.einsum("nd,nd->n", n[made.order], normal[own]), made.first[a:b])
     point = np.zeros(len(x))
-    of_vertices = (x, fans.centre, point, n, area, point, point)
-    of_nodes = (middle, centre, extent, normal, made.sums(area), radius, np.arccos(np.clip(cosine, -1.0, 1.0)))
+    of_vertices = (x, fans.centre, n, area, point, point)
+    of_nodes = (middle, centre, normal, made.sums(area), radius, np.arccos(np.clip(cosine, -1.0, 1.0)))
     return Senders(made, *(np.concatenate(pair).astype(np.float32) for pair in zip(of_vertices, of_nodes, strict=True)))
 
 
