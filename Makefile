@@ -26,7 +26,7 @@ demo: setup ## render pictures into out/
 	@echo "Pictures: $(CURDIR)/out (methods.png shows what diffusion does)"
 
 test: setup ## run the tests
-	@$(BIN)/pytest -q --durations=10
+	@$(BIN)/pytest -q --durations=10 -n 2 --dist loadfile # much of a test runs on one core
 
 bench: setup ## measure what things cost, and chart speed against accuracy into out/bench/
 	@$(BIN)/python tests/benchmarks.py

@@ -71,6 +71,7 @@ def main(argv: list[str] | None = None) -> None:
 def plot(found: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
     """Seconds over vertices, and of a vertex over the reach of light."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     over_vertices, over_reach = figure.subplots(1, 2)
@@ -80,6 +81,12 @@ def plot(found: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
         over_reach.loglog(reach, 1e6 * cpu / vertices, "o", color=COLOURS[select])
     over_vertices.set(xlabel="vertices", ylabel="CPU seconds")
     over_reach.set(xlabel="reach of light over the mesh's size", ylabel="CPU microseconds a vertex")
+    shares = [0.02, 0.05, 0.1, 0.2, 0.5]
+    over_reach.set_xticks(shares, [f"{share:.0%}" for share in shares])
+    over_reach.set_xticks([], minor=True)
+    over_reach.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0)))
+    over_reach.yaxis.set_major_formatter("{x:.0f}")
+    over_reach.yaxis.set_minor_formatter("")
     for axis in (over_vertices, over_reach):
         axis.grid(alpha=0.25)
     figure.legend(loc="outside lower center", ncols=len(found), frameon=False)
