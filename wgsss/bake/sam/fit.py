@@ -31,7 +31,8 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 SECOND = 32
-"""of how many receivers one has a second row, the one that is told worst: of `statue` a fifth (20k vertices) to a half (5k) off the error"""
+"""of how many receivers one has a second row, the one that is told worst: off the error of `statue` this takes a fifth
+at 20k vertices, and half at 5k"""
 FAINTEST = 1e-3
 """share of what a plane would give back, below which nothing shines through to a vertex"""
 COUNTED = 256
