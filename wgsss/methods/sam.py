@@ -95,8 +95,9 @@ class Adjacency:
         """M_back, W/m^2, at the vertices of a body's mesh, without what `color_after` leaves of the base colour."""
         graph, stage = frame.graph, body.stage
         rows, samples = plan.entries.sender.shape
-        zero = np.zeros((rows, 4), np.float32)
-        last = stage.shared(("M_back", self, body.index), lambda: Last(stage.gpu.buffer(zero)))
+        last = stage.shared(
+            ("M_back", self, body.index), lambda: Last(stage.gpu.buffer(np.zeros((rows, 4), np.float32)))
+        )
         passed = last.passed(stage.time_s)
         points = _points(body, plan)
         kept = KEPT_A_SECOND**passed if passed > 0.0 else 0.0

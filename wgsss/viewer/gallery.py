@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from wgsss.viewer.window import Window
 
 MARGIN, FONT_SIZE = 8.0, 13.0
-LABELLED = 0.25  # of the widest line: thinner ones have no number
 """round a text and of it, logical pixels"""
+LABELLED = 0.25
+"""of the widest line's width: thinner ones have no number"""
 
 
 class Gallery:
