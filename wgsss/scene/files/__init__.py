@@ -1,0 +1,1 @@
+"""Reading mesh files, one module per format, into what `contents` describes."""
