@@ -57,6 +57,6 @@ def light_at_vertices(stage: Stage) -> Any:
     graph, body = Graph(stage.gpu), stage.bodies[0]
     everywhere = at_vertices(body.rest.mesh)
     V = len(everywhere.face)
-    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(everywhere), V)
+    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(everywhere), V, everywhere)
     graph.run(light)
     return graph.read(light)[:, :3].astype(float)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.environment import rho_dt_table
+from wgsss.bake.samples import Samples
 from wgsss.emitters import emitters, irradiance_of
 from wgsss.graph import Graph, Handle
 from wgsss.scene import OrthographicCamera, Scene
@@ -138,6 +139,7 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
             params=params,
             surface=body.surface,
             vertices=body.vertices,
+            colors=body.colors,
             **vars(body.maps),
         )
     return drawn
@@ -210,6 +212,7 @@ def irradiance_texels(
             "planes": np.zeros((6, 4)) if planes is None else planes,
         },
         vertices=body.vertices,
+        colors=body.colors,
         least_cosines=np.array([-2.0], np.float32) if least_cosines is None else least_cosines,
         environment=body.environment.irradiance,
         **vars(body.maps),
@@ -217,16 +220,17 @@ def irradiance_texels(
     )
 
 
-def irradiance_points(frame: Frame, body: Body, points: Any, count: int) -> Handle:
+def irradiance_points(frame: Frame, body: Body, points: Any, count: int, samples: Samples | None = None) -> Handle:
     """L_d, W/m^2, at `count` points on a body, times the base colour's share that is applied before diffusion.
 
-    `points`: a buffer of array<Vertex>, such as `body.vertices` or `body.points`. Gives a buffer of vec4f.
+    `points`: a buffer of array<Vertex>: `body.vertices`, or `body.points` of `samples`. Gives a buffer of vec4f.
     """
     maps = vars(body.maps)
     return frame.graph.dispatch(
         "frame/irradiance_points",
         size=count,
         points=points,
+        colors=body.colors if samples is None else body.colors_at(samples),
         environment=body.environment.irradiance,
         base_color_map=maps["base_color_map"],
         specular_map=maps["specular_map"],

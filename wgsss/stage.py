@@ -17,6 +17,7 @@ from wgsss.bake.sky import sky_visibility
 from wgsss.bake.unwrap import Surface, split, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
+from wgsss.scene.material import WRAPS
 
 
 class Stage:
@@ -29,9 +30,9 @@ class Stage:
 
     def __init__(self, gpu: Gpu, scene: Scene, time_s: float = 0.0) -> None:
         self.gpu = gpu
-        self.rest = scene
+        self.rest = scene.near_origin()
         self.time_s = time_s
-        self.scene = scene.at(time_s)
+        self.scene = self.rest.at(time_s)
         self._shared: dict[Any, Any] = {}
         self.bodies = [Body(self, i) for i in range(len(scene.objects))]
 
@@ -184,6 +185,38 @@ class Body:
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
 
     @property
+    def is_coloured(self) -> bool:
+        """Whether the base colour varies over the body."""
+        return self.material.maps.base_color is not None or self.rest.mesh.corner_colors is not None
+
+    @property
+    def colors(self) -> Any:
+        """A buffer of vec4f: the colour of each render vertex, or one for all."""
+        if self.rest.mesh.corner_colors is None:
+            return self._white
+        key = ("colors", self.index, self._unwrapped)
+        return self.stage.shared(key, lambda: self._color_buffer(self.layout.colors))
+
+    def colors_at(self, samples: Samples) -> Any:
+        """A buffer of vec4f: the vertex colours at samples of the surface, or one for all."""
+        if self.rest.mesh.corner_colors is None:
+            return self._white
+
+        def make() -> tuple[Samples, Any]:
+            at = self.layout.colors[self.layout.faces[samples.face]]
+            return samples, self._color_buffer(np.einsum("nk,nkd->nd", samples.barycentric, at))
+
+        # The samples are kept beside the buffer, so that no others can have their id.
+        return self.stage.shared(("colors", self.index, id(samples)), make)[1]
+
+    def _color_buffer(self, colors: np.ndarray) -> Any:
+        return self.stage.gpu.buffer(np.column_stack([colors, np.ones(len(colors))]).astype(np.float32))
+
+    @property
+    def _white(self) -> Any:
+        return self.stage.shared("white", lambda: self.stage.gpu.buffer(np.ones(4, np.float32)))
+
+    @property
     def indices(self) -> Any:
         """The index buffer, u32."""
         key = ("indices", id(self.rest.mesh), self._unwrapped)
@@ -199,6 +232,9 @@ class Body:
             "color_after": material.color_after,
             "specular": material.specular,
             "id": self.index + 1,
+            "wrap": [WRAPS.index(wrap) for wrap in material.maps.wrap],
+            "nearest": int(material.maps.nearest),
+            "normal_scale": material.maps.normal_scale,
         }
 
     @cached_property

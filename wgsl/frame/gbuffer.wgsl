@@ -1,7 +1,7 @@
 // What is seen at each pixel: which object, where in its atlas, its normal, base colour and specular scale.
 
 import package::units::{Number};
-import package::mesh::{Vertex, Surface, bent_normal};
+import package::mesh::{Vertex, Surface, bent_normal, map_coordinates};
 import package::targets::{RGBA32Float, RGBA16Float, RGBA8UnormSrgb};
 
 struct Params {
@@ -16,6 +16,7 @@ struct Params {
 @group(0) @binding(4) var normal_map: texture_2d<f32>;
 @group(0) @binding(5) var specular_map: texture_2d<f32>;
 @group(0) @binding(6) var linear_repeat: sampler;
+@group(0) @binding(7) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -24,12 +25,13 @@ struct Varying {
     @location(2) uv: vec2f,
     @location(3) atlas: vec2f,
     @location(4) sky: Number,
+    @location(5) color: vec3f,
 }
 
 struct GBuffer {
     @location(0) where_seen: RGBA32Float, // atlas u, v; object id; share of the sky that is not hidden
     @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
-    @location(2) base_color: RGBA8UnormSrgb, // of the map alone: 8 bits hold its texels, but not their products
+    @location(2) base_color: RGBA8UnormSrgb, // of map and vertices alone: 8 bits hold them, but not their products
 }
 
 @vertex
@@ -37,18 +39,23 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
     let x = surface.object_to_world * vec4f(vertex.position, 1.0);
     let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
-    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas, vertex.sky);
+    let color = colors[min(i, arrayLength(&colors) - 1u)].rgb;
+    return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas, vertex.sky, color);
 }
 
 @fragment
 fn fs(in: Varying) -> GBuffer {
-    var n = bent_normal(normalize(in.normal), in.position, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
+    let normal_at = map_coordinates(surface, in.uv, textureDimensions(normal_map));
+    let slope = textureSample(normal_map, linear_repeat, normal_at).xyz;
+    var n = bent_normal(normalize(in.normal), in.position, in.uv, slope, surface.normal_scale);
     let to_eye = params.eye.xyz - in.position * params.eye.w;
     let facing = cross(dpdx(in.position), dpdy(in.position)); // an open sheet seen from behind shows its back
     if dot(in.normal, to_eye) < 0.0 && dot(in.normal, facing) * dot(facing, to_eye) < 0.0 {
         n = -n;
     }
-    let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
-    let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    let specular_at = map_coordinates(surface, in.uv, textureDimensions(specular_map));
+    let specular = surface.specular * textureSample(specular_map, linear_repeat, specular_at).r;
+    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
+    let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
     return GBuffer(vec4f(in.atlas, f32(surface.id), in.sky), vec4f(n, specular), vec4f(color, 1.0));
 }

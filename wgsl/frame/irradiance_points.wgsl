@@ -1,6 +1,6 @@
 // L_d at points on one object: its vertices, or any others. Normal maps, which need derivatives, are left out.
 
-import package::mesh::{Vertex, Surface, color_before};
+import package::mesh::{Vertex, Surface, color_before, map_coordinates};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 
@@ -16,7 +16,8 @@ import package::irradiance::{transmitted, transmitted_environment};
 @group(0) @binding(9) var base_color_map: texture_2d<f32>;
 @group(0) @binding(10) var specular_map: texture_2d<f32>;
 @group(0) @binding(11) var linear_repeat: sampler;
-@group(0) @binding(12) var<storage, read_write> irradiance: array<vec4f>; // L_d times the base colour's share before diffusion
+@group(0) @binding(12) var<storage, read> colors: array<vec4f>; // of each point, or one for all
+@group(0) @binding(13) var<storage, read_write> irradiance: array<vec4f>; // L_d times the base colour's share before diffusion
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -27,8 +28,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let x = (surface.object_to_world * vec4f(point.position, 1.0)).xyz;
     let n = normalize((surface.object_to_world * vec4f(point.normal, 0.0)).xyz);
     let uv = vec2f(point.u, point.v);
-    let color = textureSampleLevel(base_color_map, linear_repeat, uv, 0.0).rgb;
-    let specular = surface.specular * textureSampleLevel(specular_map, linear_repeat, uv, 0.0).r;
+    let color_at = map_coordinates(surface, uv, textureDimensions(base_color_map));
+    let texel = textureSampleLevel(base_color_map, linear_repeat, color_at, 0.0).rgb;
+    let color = colors[min(id.x, arrayLength(&colors) - 1u)].rgb * texel;
+    let specular_at = map_coordinates(surface, uv, textureDimensions(specular_map));
+    let specular = surface.specular * textureSampleLevel(specular_map, linear_repeat, specular_at, 0.0).r;
     var total = transmitted_environment(environment, linear_wrap_u, n, point.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];

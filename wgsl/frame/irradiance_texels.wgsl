@@ -1,7 +1,7 @@
 // L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
 
 import package::units::{Number};
-import package::mesh::{Vertex, Surface, bent_normal, color_before};
+import package::mesh::{Vertex, Surface, bent_normal, color_before, map_coordinates};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::screen::{direction_to_eye};
@@ -29,6 +29,7 @@ struct Params {
 @group(0) @binding(13) var<uniform> params: Params;
 // Of the angle between normal and viewer, from which on texels are lit: at each vertex, or one for all.
 @group(0) @binding(14) var<storage, read> least_cosines: array<f32>;
+@group(0) @binding(15) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -37,6 +38,7 @@ struct Varying {
     @location(2) uv: vec2f,
     @location(3) sky: Number,
     @location(4) least_cosine: Number,
+    @location(5) color: vec3f,
 }
 
 struct Texel {
@@ -50,7 +52,8 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
     let clip = vec4f(vertex.atlas.x * 2.0 - 1.0, 1.0 - vertex.atlas.y * 2.0, 0.0, 1.0);
     let least_cosine = least_cosines[min(i, arrayLength(&least_cosines) - 1u)];
-    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky, least_cosine);
+    let color = colors[min(i, arrayLength(&colors) - 1u)].rgb;
+    return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky, least_cosine, color);
 }
 
 // Whether a part of the texel about x faces the viewer enough, in front of all planes.
@@ -70,9 +73,12 @@ fn fs(in: Varying) -> Texel {
     let dy = dpdy(x);
     let n_s = normalize(in.normal);
     let wanted = is_wanted(x, n_s, in.least_cosine);
-    let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, in.uv).xyz);
-    let specular = surface.specular * textureSample(specular_map, linear_repeat, in.uv).r;
-    let color = textureSample(base_color_map, linear_repeat, in.uv).rgb;
+    let normal_at = map_coordinates(surface, in.uv, textureDimensions(normal_map));
+    let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, normal_at).xyz, surface.normal_scale);
+    let specular_at = map_coordinates(surface, in.uv, textureDimensions(specular_map));
+    let specular = surface.specular * textureSample(specular_map, linear_repeat, specular_at).r;
+    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
+    let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
     var irradiance = transmitted_environment(environment, linear_wrap_u, n, in.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         if !wanted {

@@ -1,6 +1,6 @@
 // Where each pixel sees a surface: the face, and where on it.
 
-import package::mesh::{Vertex, Surface, color_after};
+import package::mesh::{Vertex, Surface, color_after, map_coordinates};
 import package::targets::{RGBA32Float};
 
 struct Params {
@@ -13,12 +13,14 @@ struct Params {
 @group(0) @binding(3) var<storage, read> corners: array<u32>; // vertices of the faces
 @group(0) @binding(4) var base_color_map: texture_2d<f32>;
 @group(0) @binding(5) var linear_repeat: sampler;
+@group(0) @binding(6) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
     @location(0) barycentric: vec2f,
     @location(1) uv: vec2f,
     @location(2) @interpolate(flat) face: u32,
+    @location(3) color: vec3f,
 }
 
 struct Receivers {
@@ -31,11 +33,13 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[corners[i]];
     let x = surface.object_to_world * vec4f(vertex.position, 1.0);
     let barycentric = vec2f(f32(i % 3u == 0u), f32(i % 3u == 1u));
-    return Varying(params.world_to_clip * x, barycentric, vec2f(vertex.u, vertex.v), i / 3u);
+    let color = colors[min(corners[i], arrayLength(&colors) - 1u)].rgb;
+    return Varying(params.world_to_clip * x, barycentric, vec2f(vertex.u, vertex.v), i / 3u, color);
 }
 
 @fragment
 fn fs(in: Varying) -> Receivers {
-    let color = color_after(surface, textureSample(base_color_map, linear_repeat, in.uv).rgb);
+    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
+    let color = color_after(surface, in.color * textureSample(base_color_map, linear_repeat, color_at).rgb);
     return Receivers(vec4f(in.barycentric, f32(in.face), f32(surface.id)), vec4f(color, 1.0));
 }

@@ -29,7 +29,7 @@ least 8 between two charts at 1024, and 4 at 512."""
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The render mesh: the mesh's vertices, split where texture coordinates or normals differ."""
+    """The render mesh: the mesh's vertices, split where texture coordinates, normals or colours differ."""
 
     vertex: Array
     """int32 (R,), index into the mesh's positions"""
@@ -41,6 +41,8 @@ class Surface:
     """float32 (R, 2), the file's own texture coordinates for its maps, v down, or zeros"""
     faces: Array
     """int32 (F, 3), indices of render vertices, the faces in the mesh's order"""
+    colors: Array
+    """float32 (R, 3), the file's vertex colours, linear, or ones"""
     charts: Array
     """int32 (F,), the connected piece of the atlas that a face is in, 0..C-1"""
 
@@ -51,7 +53,7 @@ def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
 
     Raises InputError where the mesh has no face with an area.
     """
-    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs]
+    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors]
 
     def make() -> Arrays:
         surface = _unwrap(gpu, mesh)
@@ -76,16 +78,18 @@ def _unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
 
 
 def _render_mesh(mesh: Mesh, atlas: Array | None) -> Surface:
-    """The mesh split where what corners carry differs: the atlas (F, 3, 2), the mesh's own uvs, its normals."""
-    corners = [a.reshape(-1, a.shape[-1]) for a in (atlas, mesh.corner_uvs, mesh.corner_normals) if a is not None]
+    """The mesh split where what corners carry differs: the atlas (F, 3, 2), the mesh's own uvs, normals, colours."""
+    carried = (atlas, mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors)
+    corners = [a.reshape(-1, a.shape[-1]) for a in carried if a is not None]
     first, index = _distinct([mesh.faces.reshape(-1, 1), *corners])
     vertex = mesh.faces.reshape(-1)[first]
-    none = np.zeros((len(first), 2), np.float32)
+    none, white = np.zeros((len(first), 2), np.float32), np.ones((len(first), 3), np.float32)
     return Surface(
         vertex=vertex,
         normals=mesh.shading_normals.reshape(-1, 3)[first],
         atlas=none if atlas is None else atlas.reshape(-1, 2)[first],
         uvs=none if mesh.corner_uvs is None else mesh.corner_uvs.reshape(-1, 2)[first],
+        colors=white if mesh.corner_colors is None else mesh.corner_colors.reshape(-1, 3)[first],
         faces=index.reshape(-1, 3).astype(np.int32),
         charts=np.zeros(len(mesh.faces), np.int32),
     )

@@ -130,7 +130,7 @@ class LocalThickness:
                 into=M_back,
                 size=frame.size,
                 indices=body.indices,
-                constants={"MAPPED": body.material.maps.base_color is not None},
+                constants={"MAPPED": body.is_coloured},
                 params={"world_to_clip": frame.view.world_to_clip, **_seen(frame, body)},
                 vertices=body.vertices,
                 thickness=thickness,

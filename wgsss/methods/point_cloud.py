@@ -117,7 +117,7 @@ class PointCloud:
         """What the nodes of a body's octree stand for, from the samples up."""
         graph, posed, cloud = frame.graph, self._posed(body), self.cloud(body)
         tree, params = cloud.tree, {"epsilon": self.epsilon, "farthest": self.kernel(body).r[-1]}
-        irradiance = shared.irradiance_points(frame, body, posed.points, len(cloud.samples.face))
+        irradiance = shared.irradiance_points(frame, body, posed.points, len(cloud.samples.face), cloud.samples)
         entering = graph.dispatch(
             "point_cloud/enter_samples",
             size=len(tree.first),

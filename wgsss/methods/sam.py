@@ -109,7 +109,7 @@ class Adjacency:
         senders, nodes = len(plan.points.face), plan.nodes
         blend = plan.entries.blend
         blended = 0 if blend is None else len(blend.node)
-        irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended)
+        irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended, plan.points)
         irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=plan.area)
         if blended:
             irradiance = graph.dispatch(

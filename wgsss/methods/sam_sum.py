@@ -44,7 +44,7 @@ def sum_behind(frame: Frame, body: Body, plan: Plan, points: Any, last: Any, kep
     """
     graph, stage = frame.graph, body.stage
     pose = posed(graph, body, plan, points)
-    irradiance = shared.irradiance_points(frame, body, points, len(plan.points.face) + plan.nodes)
+    irradiance = shared.irradiance_points(frame, body, points, len(plan.points.face) + plan.nodes, plan.points)
     irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=pose.area)
     scale = stage.shared(("scale", id(plan)), lambda: stage.gpu.buffer(_scale(body, plan)))
     return _sum(graph, body, plan, places=pose.places, irradiance=irradiance, scale=scale, last=last, kept=kept)

@@ -86,6 +86,6 @@ def irradiance_at(body: Body, places: Samples) -> Array:
     for first in range(0, len(places.face), _POINTS):
         some = slice(first, first + _POINTS)
         chosen = Samples(places.face[some], places.barycentric[some], places.share[some])
-        handles.append(irradiance_points(frame, body, body.points(chosen), len(chosen.face)))
+        handles.append(irradiance_points(frame, body, body.points(chosen), len(chosen.face), chosen))
     graph.run(*handles, timed=True)  # each pass in a submission of its own
     return np.concatenate([graph.read(h)[:, :3] for h in handles])

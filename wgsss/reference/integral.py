@@ -136,6 +136,7 @@ def _cached(
         surface = (material.roughness, material.eta, material.specular, material.base_color, material.color_after)
         key += [repr(surface), *vars(material.maps).values(), body.rest.matrix, body.rest.mesh.positions]
         key += [body.mesh.positions, body.mesh.faces, body.mesh.corner_normals, body.mesh.corner_uvs]
+        key.append(body.mesh.corner_colors)
     for index, profile in profiles.items():
         key += [index, profile.total, profile.reflectance(_PROBES)]
     found = cached("integral", key, make, code=_CODE)
@@ -159,6 +160,7 @@ def _seen(frame: Frame) -> Any:
             surface=body.surface,
             vertices=body.vertices,
             corners=body.indices,
+            colors=body.colors,
             base_color_map=body.maps.base_color_map,
         )
     return drawn

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from wgsss.scene.bodies import LoadedFile, LoadedMesh, load_file, load_mesh
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
 from wgsss.scene.loading import load_material, load_scene
 from wgsss.scene.material import MATERIALS, Maps, Material, material
-from wgsss.scene.mesh import LoadedMesh, Mesh, load_mesh
+from wgsss.scene.mesh import Mesh
 from wgsss.scene.scene import Object, Scene
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "DirectionalLight",
     "EnvironmentLight",
     "Light",
+    "LoadedFile",
     "LoadedMesh",
     "Maps",
     "Material",
@@ -26,6 +28,7 @@ __all__ = [
     "RectLight",
     "Scene",
     "SphereLight",
+    "load_file",
     "load_material",
     "load_mesh",
     "load_scene",

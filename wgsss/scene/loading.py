@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from wgsss.errors import InputError, unknown
+from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera
-from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.defaults import DEFAULT_LIGHTS, framing
+from wgsss.scene.fileview import camera_in, lights_of
 from wgsss.scene.light import Light
 from wgsss.scene.material import Material
 from wgsss.scene.materialfile import Chosen, choose_material
-from wgsss.scene.mesh import load_mesh
+from wgsss.scene.meshobjects import objects_of
+from wgsss.scene.repair import counted
 from wgsss.scene.scene import Object, Scene
 from wgsss.scene.scenefile import camera_of, light_of, read_scene
 from wgsss.scene.tables import Table
@@ -23,43 +27,86 @@ def load_scene(
     *,
     material: str | Path | Table | Material | None = None,
     size_mm: float | None = None,
+    animation: str | None = None,
+    simplify: int | None = None,
     vertices: int | None = None,
     camera: Table | Camera | None = None,
     lights: Sequence[Table | Light] = (),
+    file_camera: bool = False,
+    file_lights: bool = False,
 ) -> Scene:
     """A built-in scene by its name, a scene file (.toml), or a mesh file with default lights and a camera to frame it.
 
-    `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. `size_mm`
-    is for a mesh file: the length of its longest side. `vertices` is for a built-in scene: about how many it has.
-    `camera`, and `lights` where there are any, take the place of the scene's own; they and the material may be tables
-    with the keys of a scene file.
+    `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. For a
+    mesh file, `size_mm` is the length of its longest side, `animation` the name of the one to play or "none", and
+    `simplify` the greatest number of faces of a body; `file_camera` and `file_lights` take the camera and the lights
+    that it holds in place of the default ones. `vertices` is for a built-in scene: about how many it has. `camera`, and `lights` where
+    there are any, take the place of the scene's own; they and the material may be tables with the keys of a scene file.
 
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """
     chosen = None if material is None else choose_material(material, Path(), "material")
-    return with_view(_scene(name_or_path, chosen, size_mm, vertices), camera, lights)
+    for_mesh = {"size_mm": size_mm, "animation": animation, "simplify": simplify}
+    if file_camera and camera is not None:
+        raise InputError("file_camera and camera exclude each other: give one of them")
+    if file_lights and lights:
+        raise InputError("file_lights and lights exclude each other: give one of them")
+    name, path = str(name_or_path), Path(name_or_path)
+    if _is_mesh(name, path):
+        if vertices is not None:
+            raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
+        scene = _of_mesh(path, chosen, for_mesh, file_camera, file_lights)
+    else:
+        given = [key for key, value in for_mesh.items() if value is not None]
+        given += [key for key, on in (("file_camera", file_camera), ("file_lights", file_lights)) if on]
+        if given:
+            raise InputError(f"{name}: {given[0]} is for mesh files; this scene says for itself")
+        scene = _of_name(name, path, chosen, vertices)
+    return with_view(scene, camera, lights)
 
 
-def _scene(name_or_path: str | Path, chosen: Chosen | None, size_mm: float | None, vertices: int | None) -> Scene:
+def _is_mesh(name: str, path: Path) -> bool:
     from wgsss.scene.builtin import SCENES
 
-    name, path = str(name_or_path), Path(name_or_path)
-    builtin = name in SCENES
-    if not builtin and not path.suffix and len(path.parts) == 1:
+    if name in SCENES:
+        return False
+    if not path.suffix and len(path.parts) <= 1:
         raise unknown("scene", name, SCENES)
-    is_mesh = not builtin and path.suffix.lower() != ".toml"
-    if size_mm is not None and not is_mesh:
-        raise InputError(f"{name}: size_mm is for mesh files; this scene says how large it is")
-    if vertices is not None and not builtin:
-        raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
+    return path.suffix.lower() != ".toml"
 
-    if is_mesh:
-        loaded = load_mesh(path, size_mm=size_mm)
-        chosen = chosen or choose_material(DEFAULT_MATERIAL, Path())
-        thing = Object(loaded.mesh, chosen.on(loaded.maps), motion=loaded.motion)
-        return Scene(path.stem, (thing,), DEFAULT_LIGHTS, framing([thing]))
-    scene: Scene = SCENES[name](vertices) if builtin else read_scene(path)
+
+def _of_name(name: str, path: Path, chosen: Chosen | None, vertices: int | None) -> Scene:
+    from wgsss.scene.builtin import SCENES
+
+    if vertices is not None and name not in SCENES:
+        raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
+    scene: Scene = SCENES[name](vertices) if name in SCENES else read_scene(path)
     return scene if chosen is None else _dressed(scene, chosen)
+
+
+def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: bool, file_lights: bool) -> Scene:
+    file = load_file(path, **options)
+    things = objects_of(file, chosen, path.name)
+    lights: Sequence[Light] = DEFAULT_LIGHTS
+    if file_lights:
+        lights = lights_of(file)
+        if not lights:
+            raise InputError(f"{path}: it holds no lights")
+    elif file.lights:
+        _left_out(path, len(file.lights), "light", "--file-lights")
+    camera: Camera | None = None
+    if file_camera:
+        camera = camera_in(file, things)
+        if camera is None:
+            raise InputError(f"{path}: it holds no camera")
+    elif file.cameras:
+        _left_out(path, len(file.cameras), "camera", "--file-camera")
+    return Scene(path.stem, things, tuple(lights), camera or framing(things))
+
+
+def _left_out(path: Path, count: int, what: str, option: str) -> None:
+    verb = "is" if count == 1 else "are"
+    warnings.warn(f"{path.name}: {counted(count, what)} of the file {verb} not used ({option} uses them)", stacklevel=2)
 
 
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:
@@ -76,7 +123,11 @@ def with_view(scene: Scene, camera: Table | Camera | None, lights: Sequence[Tabl
 
 
 def _dressed(scene: Scene, chosen: Chosen) -> Scene:
-    return replace(scene, objects=tuple(replace(o, material=chosen.on(o.material.maps)) for o in scene.objects))
+    return replace(scene, objects=tuple(_in(chosen, o) for o in scene.objects))
+
+
+def _in(chosen: Chosen, thing: Object) -> Object:
+    return replace(thing, material=chosen.on(thing.material.maps, thing.mesh.corner_colors is not None))
 
 
 def load_material(name_or_path: str | Path) -> Material:

@@ -16,6 +16,10 @@ from wgsss.optics.medium import coefficients, stack
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
 
+WRAPS = ("repeat", "clamp", "mirror")  # in the order of wgsl/mesh.wgsl
+SLOTS = ("base_color", "normal", "specular")
+"""the textures there are"""
+
 
 @dataclass(frozen=True, eq=False)
 class Maps:
@@ -27,8 +31,20 @@ class Maps:
     """uint8 (H, W, 3), linear, tangent space"""
     specular: npt.NDArray[Any] | None = None
     """uint8 (H, W), linear"""
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    """what they show beyond 0 to 1, along u and v: each one of WRAPS"""
+    nearest: bool = False
+    """whether they are not interpolated between texels"""
+    normal_scale: float = 1.0
+    """of the slopes of the normal map"""
+    tint: Triple = (1.0, 1.0, 1.0)
+    """linear, of the mesh's own material: part of the base colour of whatever material the mesh gets"""
 
     def __post_init__(self) -> None:
+        if len(self.wrap) != 2 or any(wrap not in WRAPS for wrap in self.wrap):
+            raise InputError(f"wrap must be two of {', '.join(WRAPS)}, not {self.wrap!r}")
+        checks.number(self, "normal_scale", -100, 100)
+        checks.triple(self, "tint", 0, 1)
         for name, channels in (("base_color", 3), ("normal", 3), ("specular", None)):
             pixels = getattr(self, name)
             if pixels is not None and (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from wgsss.errors import InputError
 from wgsss.optics import Dipole, Layer, SumOfGaussians, Tabulated
 from wgsss.scene import tables
 from wgsss.scene.images import read_map
-from wgsss.scene.material import IN_PLACE, MATERIALS, Maps, Material, material
+from wgsss.scene.material import IN_PLACE, MATERIALS, SLOTS, Maps, Material, material
 
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 _INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")
@@ -27,15 +27,24 @@ class Chosen:
     coloured: bool
     """whether its base colour was asked for too, and does not merely come with a measured material"""
 
-    def on(self, maps: Maps) -> Material:
+    def on(self, maps: Maps, coloured_vertices: bool = False) -> Material:
         """The material on a mesh with these textures, which serve where it has none of its own.
 
-        A base colour texture is the colour: it takes the place of a constant one, unless that was asked for to tint it.
+        A colour that varies over the mesh, by a texture or by its vertices, is the base colour: it takes the place of a
+        constant one, unless that was asked for to tint it. So is a constant colour of the mesh (`Maps.tint`), unless
+        the material has one of its own.
         """
         own = self.material.maps
-        both = Maps(**{f.name: _first(getattr(own, f.name), getattr(maps, f.name)) for f in fields(Maps)})
-        keep = self.coloured or both.base_color is None
-        return replace(self.material, maps=both, base_color=self.material.base_color if keep else (1.0, 1.0, 1.0))
+        both = replace(maps, **{slot: getattr(own, slot) for slot in SLOTS if getattr(own, slot) is not None})
+        if own.base_color is not None:
+            both = replace(both, tint=(1.0, 1.0, 1.0))
+        constant, varies = self.material.base_color, both.base_color is not None or coloured_vertices
+        if not self.coloured and (varies or constant == (1.0, 1.0, 1.0)):
+            constant = both.tint
+        elif varies:
+            red, green, blue = (c * t for c, t in zip(constant, both.tint, strict=True))
+            constant = (red, green, blue)
+        return replace(self.material, maps=both, base_color=constant)
 
 
 def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
@@ -56,7 +65,7 @@ def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
 
 def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Chosen:
     parameters = {key: p for key, p in inspect.signature(Material).parameters.items() if key != "maps"}
-    slots = {f"{f.name}_map": f.name for f in fields(Maps)}
+    slots = {f"{slot}_map": slot for slot in SLOTS}
     tables.check_keys(table, [*parameters, *slots, *_INVERTED, "preset"], where)
 
     values: tables.Table = {"name": name}
@@ -107,7 +116,3 @@ def _inverted(table: tables.Table, eta: Any, where: str) -> tables.Table:
     except InputError as error:
         raise tables.at(where, error) from None
     return {"sigma_a": medium.sigma_a, "sigma_s_prime": medium.sigma_s_prime}
-
-
-def _first(*values: Any) -> Any:
-    return next((value for value in values if value is not None), None)

@@ -120,6 +120,10 @@ class Part:
     """float32 (T, V, 3): what each morph target adds to the positions"""
     skin: Skin | None
 
+    def is_shaped(self, pose: Pose) -> bool:
+        """Whether a pose does more than to place it with its node."""
+        return self.skin is not None or bool(pose.weights[self.node].any())
+
     def posed(self, pose: Pose, world: Array) -> Array:
         """float64 (V, 3), in the scene's space."""
         morphed = self.positions
@@ -138,6 +142,10 @@ class Rig:
 
     nodes: Nodes
     parts: tuple[Part, ...]
+
+    def of(self, numbers: Sequence[int]) -> Rig:
+        """The rig of some of the parts, by number."""
+        return Rig(self.nodes, tuple(self.parts[number] for number in numbers))
 
     def positions(self, pose: Pose) -> Array:
         """float64 (V, 3): the vertices of all parts, one after the other, in the file's units."""

@@ -21,6 +21,9 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 TONE_MAPS = ("none", "reinhard", "aces")
+FAR = 16.0
+"""Distance of the point that the camera looks at from the origin, in distances from the camera, beyond which a scene is
+moved to the origin to be rendered."""
 
 
 class Motion(Protocol):
@@ -111,6 +114,24 @@ class Scene:
         """(2, 3): the least and greatest coordinates of all objects, world mm."""
         points = np.concatenate([o.placed for o in self.objects])
         return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def near_origin(self) -> Scene:
+        """The same scene moved so that what the camera looks at is at the origin, where that is far away: coordinates in
+        single precision would be too coarse there."""
+        camera = self.camera
+        if math.dist((0, 0, 0), camera.target) <= FAR * math.dist(camera.eye, camera.target):
+            return self
+
+        def moved(point: Triple) -> Triple:
+            x, y, z = (float(p - t) for p, t in zip(point, camera.target, strict=True))
+            return x, y, z
+
+        return replace(
+            self,
+            objects=tuple(replace(o, translate=moved(o.translate)) for o in self.objects),
+            lights=tuple(replace(p, position=moved(p.position)) if hasattr(p, "position") else p for p in self.lights),
+            camera=replace(camera, eye=moved(camera.eye), target=(0.0, 0.0, 0.0)),
+        )
 
     def at(self, time_s: float) -> Scene:
         """The scene as it is at a time in seconds: a still, in which nothing moves or turns."""

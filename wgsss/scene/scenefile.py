@@ -2,8 +2,9 @@
 
 The top level holds `name`, `exposure`, `tone_map` and `bloom`. `[camera]`, each `[[light]]` and each `[[object]]` hold
 the fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and
-`elevation` of an orbit. An object has a `mesh` (a file, with `mm_per_unit` or `size_mm` and the `animation` of a glTF)
-or a `shape` (with the arguments of that function in `shapes`), and a `material`: a name, a material file, or a table
+`elevation` of an orbit. An object has a `mesh`, a file, or a `shape` with the arguments of that function in `shapes`.
+Beside a `mesh` may stand `mm_per_unit` or `size_mm`, the `animation` of a glTF, and `simplify`, the greatest number of
+faces; each material of the file becomes an object. A `material` is a name, a material file, or a table
 `[object.material]`. Such a table or file holds the fields of Material, may start from a `preset`, and names images as
 `base_color_map`, `normal_map` and `specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake
 case. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
@@ -20,12 +21,12 @@ from typing import Any
 from wgsss.errors import InputError
 from wgsss.scene import tables
 from wgsss.scene.animation import NONE
+from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
-from wgsss.scene.material import Maps
 from wgsss.scene.materialfile import choose_material
-from wgsss.scene.mesh import load_mesh
+from wgsss.scene.meshobjects import objects_of
 from wgsss.scene.scene import Object, Scene
 from wgsss.scene.tables import Table
 
@@ -46,7 +47,7 @@ def read_scene(path: Path) -> Scene:
     simple = [key for key in inspect.signature(Scene).parameters if key not in parts]
     tables.check_keys(table, [*simple, *parts.values()], where)
 
-    objects = tuple(_object(t, place, folder) for t, place in tables.each(table, "object", where))
+    objects = tuple(o for t, place in tables.each(table, "object", where) for o in _objects(t, place, folder))
     if not objects:
         raise InputError(f"{where}: there is no [[object]] to render")
     lights = tuple(light_of(t, place, folder) for t, place in tables.each(table, "light", where))
@@ -58,33 +59,38 @@ def read_scene(path: Path) -> Scene:
     return scene
 
 
-def _object(table: Table, where: str, folder: Path) -> Object:
+def _objects(table: Table, where: str, folder: Path) -> tuple[Object, ...]:
+    """What an [[object]] is: one thing of a shape, or all bodies of a mesh file."""
     if ("mesh" in table) == ("shape" in table):
         raise InputError(f"{where}: give either mesh, a file, or shape, a name")
-    source = load_mesh if "mesh" in table else tables.choose(_shapes(), table["shape"], "shape", where)
+    source = load_file if "mesh" in table else tables.choose(_shapes(), table["shape"], "shape", where)
     options = [key for key in inspect.signature(source).parameters if key != "path"]
     own = [key for key in inspect.signature(Object).parameters if key != "mesh"]
     tables.check_keys(table, ["mesh", "shape", *own, *options], where)
 
-    arguments, maps, motion = {key: table[key] for key in options if key in table}, Maps(), None
+    arguments = {key: table[key] for key in options if key in table}
     if "mesh" in table:
         arguments["path"] = tables.file_in(table, "mesh", where, folder)
         if "motion" in table and arguments.setdefault("animation", NONE) != NONE:
             raise InputError(f"{where}: give either motion or the animation of the mesh")
-    mesh = tables.call(source, arguments, where)
-    if "mesh" in table:
-        mesh, maps, motion = mesh.mesh, mesh.maps, mesh.motion
+    made = tables.call(source, arguments, where)
 
-    values = {"motion": motion, **{key: table[key] for key in own if key in table}}
-    try:
-        chosen = choose_material(table.get("material", DEFAULT_MATERIAL), folder, f"{where}: [object.material]")
-    except InputError as error:
-        raise tables.at(where, error) from None
-    values["material"] = chosen.on(maps)
+    values = {key: table[key] for key in own if key in table and key != "material"}
     if "motion" in table:
         values["motion"] = tables.call_kind(table["motion"], _motions(), f"{where}: [object.motion]")
-    thing: Object = tables.call(Object, {"mesh": mesh, **values}, where)
-    return thing
+    chosen = None
+    try:
+        if "material" in table:
+            chosen = choose_material(table["material"], folder, f"{where}: [object.material]")
+    except InputError as error:
+        raise tables.at(where, error) from None
+    if "mesh" in table:
+        found: tuple[Object, ...] = tables.call(
+            objects_of, {"file": made, "chosen": chosen, "where": arguments["path"].name, **values}, where
+        )
+        return found
+    material = DEFAULT_MATERIAL if chosen is None else chosen.material
+    return (tables.call(Object, {"mesh": made, "material": material, **values}, where),)
 
 
 def _shapes() -> dict[str, Any]:

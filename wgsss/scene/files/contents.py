@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 Triple = tuple[float, float, float]
 
-WRAPS = ("repeat", "clamp", "mirror")
-
 
 @dataclass(frozen=True)
 class Texture:
@@ -38,7 +36,7 @@ class Texture:
     transform: tuple[Triple, Triple] | None = None
     """rows of a matrix (2, 3): its coordinates are that times (u, v, 1) of the set, v down"""
     wrap: tuple[str, str] = ("repeat", "repeat")
-    """what is beyond 0 to 1, along u and v: one of WRAPS"""
+    """what is beyond 0 to 1, along u and v: one of material.WRAPS"""
     nearest: bool = False
     """whether it is not interpolated between its texels"""
 

@@ -1,0 +1,283 @@
+"""Mesh files as bodies: parts of one look joined, cut by their mask, scaled, welded and repaired."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.animation import Animation, choose_clip, first_of_equal
+from wgsss.scene.blend import Blend
+from wgsss.scene.checks import Triple
+from wgsss.scene.dressing import Wardrobe, shared, wearable
+from wgsss.scene.files import read_file
+from wgsss.scene.files.contents import CameraView, Contents, LightSource, Look
+from wgsss.scene.material import Maps
+from wgsss.scene.mesh import MAX_SIZE, MIN_SIZE, Mesh
+from wgsss.scene.repair import Repaired, counted, repair
+from wgsss.scene.rig import Rig
+from wgsss.scene.simplify import simplified
+from wgsss.scene.soup import Soup, joined, placed
+
+Array = npt.NDArray[Any]
+
+# A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
+# or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
+OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
+FAR = 16.0
+"""Distance from the origin, in sizes of a body, beyond which its positions are kept relative to its own middle: float32
+would lose four bits or more of them."""
+MOST_VERTICES = 2_796_202
+"""What a storage binding of 128 MiB, WebGPU's default limit, holds of the 48 bytes of a vertex."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMesh:
+    """One body of a mesh file: a surface, its textures, how it moves, and what the file says of its material."""
+
+    mesh: Mesh
+    maps: Maps = field(default_factory=Maps)
+    motion: Animation | None = None
+    look: Look = field(default_factory=Look)
+    """as the file has it"""
+    mm_per_unit: float = 1.0
+    """millimetres per unit of the file's lengths, as it was scaled"""
+    translate: Triple = (0.0, 0.0, 0.0)
+    """where the mesh's origin lies in the file's space, mm: not zero only for what is far from the file's origin"""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedFile:
+    """All bodies of a mesh file, and its own lights and cameras."""
+
+    bodies: tuple[LoadedMesh, ...]
+    lights: tuple[LightSource, ...]
+    cameras: tuple[CameraView, ...]
+
+
+def load_mesh(
+    path: str | Path,
+    *,
+    mm_per_unit: float | None = None,
+    size_mm: float | None = None,
+    animation: str | None = None,
+    simplify: int | None = None,
+) -> LoadedMesh:
+    """Read a mesh file as one body. Arguments, warnings and errors are those of `load_file`.
+
+    Where its materials differ, only what they share is kept; a warning says what is not.
+    """
+    file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
+    looks = [wearable(part, file.say) for part in file.contents.parts]
+    return file.bodies({shared(looks, file.say): list(range(len(looks)))})[0]
+
+
+def load_file(
+    path: str | Path,
+    *,
+    mm_per_unit: float | None = None,
+    size_mm: float | None = None,
+    animation: str | None = None,
+    simplify: int | None = None,
+) -> LoadedFile:
+    """Read a .ply, .obj, .stl, .off, .glb or .gltf file: one body for each material that looks different.
+
+    `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
+    others. `size_mm` scales the longest side of the bounding box, at rest, to a length, whatever the unit. `animation`
+    is the name of the glTF animation that becomes the motion, or its number where it has none: without it the first
+    one, and none where it is "none". `simplify` is the greatest number of faces of a body: one with more is simplified,
+    and loses texture coordinates, normals, vertex colours and motion.
+
+    Normals are kept where they are not smooth. Degenerate and duplicate faces and unused vertices are dropped, faces
+    wound inwards turned over and holes counted, in one warning for each body. What the file has and wgsss does not use
+    is a warning each.
+
+    Raises InputError, naming the file, where it is missing, not what its extension says, empty, without an area, larger
+    than the device can hold, or holds positions that are not finite, for a skin, morph targets or an animation that do
+    not fit it, and for a scale that is not positive.
+    """
+    file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
+    groups: dict[Look, list[int]] = {}
+    for number, part in enumerate(file.contents.parts):
+        groups.setdefault(wearable(part, file.say), []).append(number)
+    bodies = file.bodies(groups)
+    return LoadedFile(bodies, file.contents.lights, file.contents.cameras)
+
+
+class _File:
+    """A file that was read, on its way to bodies."""
+
+    def __init__(
+        self,
+        path: Path,
+        mm_per_unit: float | None,
+        size_mm: float | None,
+        animation: str | None,
+        simplify: int | None,
+    ) -> None:
+        for name, value in (("mm_per_unit", mm_per_unit), ("size_mm", size_mm)):
+            if value is not None and not (_is_number(value) and 0 < value < math.inf):
+                raise InputError(f"{path}: {name} must be a number above 0, not {value!r}")
+        if simplify is not None and not (_is_number(simplify) and int(simplify) == simplify and simplify >= 4):
+            raise InputError(f"{path}: simplify must be a whole number of faces from 4 up, not {simplify!r}")
+        self.path, self.simplify = path, simplify
+        self.contents = read_file(path)
+        try:
+            self._clip = choose_clip(self.contents, animation)
+            self._placed = placed(self.contents.parts, self.contents.rig)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        bad = sum(int((~np.isfinite(positions)).any(axis=1).sum()) for positions in self._placed)
+        if bad:
+            raise InputError(f"{path}: {bad} of {sum(map(len, self._placed))} positions are not finite numbers")
+        self.scale = _scale(path, self.contents, self._placed, mm_per_unit, size_mm)
+        self._wardrobe = Wardrobe(self.say)
+        for note in self.contents.notes:
+            self.say(note)
+
+    def say(self, note: str) -> None:
+        warnings.warn(f"{self.path.name}: {note}", stacklevel=2)
+
+    def bodies(self, groups: dict[Look, list[int]]) -> tuple[LoadedMesh, ...]:
+        """A body for each look, of parts by number."""
+        found, why = [], "all faces are degenerate"
+        for look, numbers in groups.items():
+            name = look.name if len(groups) > 1 else ""
+            soup, rig = self._soup(look, numbers)
+            mask = self._wardrobe.mask(look)
+            if mask is not None:
+                soup = soup.cut(mask)
+            if not len(soup.faces):
+                self.say(f"{_named(name)}nothing is drawn where alpha is below {look.cutoff:g}, which is everywhere")
+                why = "its alpha mask leaves nothing"
+                continue
+            body = self._body(look, name, soup, rig, self._splits(numbers))
+            if body is not None:
+                found.append(body)
+            elif len(groups) > 1:
+                self.say(f"{_named(name)}left out: all its faces are degenerate")
+        if not found:
+            count = sum(len(part.faces) for part in self.contents.parts)
+            why = f"all {count} faces are degenerate" if why.startswith("all") else why
+            raise InputError(f"{self.path}: the mesh has no area: {why}")
+        return tuple(found)
+
+    def _soup(self, look: Look, numbers: Sequence[int]) -> tuple[Soup, Rig | None]:
+        contents = self.contents
+        rig = None if contents.rig is None else contents.rig.of(numbers)
+        parts = [contents.parts[number] for number in numbers]
+        soup = joined(parts, [self._placed[number] for number in numbers], look, rig, self.say)
+        if rig is not None:
+            soup = replace(soup, positions=soup.positions[first_of_equal(rig)])
+        return soup, rig
+
+    def _splits(self, numbers: Sequence[int]) -> bool:
+        """Whether vertices may be repeated for a reason: seams, hard edges, several parts, a format without indices."""
+        parts = [self.contents.parts[number] for number in numbers]
+        return self.contents.splits or len(parts) > 1 or any(part.uvs or part.normals is not None for part in parts)
+
+    def _body(self, look: Look, name: str, soup: Soup, rig: Rig | None, splits: bool) -> LoadedMesh | None:
+        """A soup as a mesh with all that it wears; None where no face has an area."""
+        centre, positions = _centred(soup.positions * self.scale, soup.faces)
+        faces, notes = soup.faces, []
+        moving = self._clip is not None
+        if self.simplify is not None and len(faces) > self.simplify:
+            positions, faces = simplified(positions, faces, self.simplify)
+            lost = {
+                "texture coordinates": soup.uvs is not None,
+                "normals": soup.normals is not None,
+                "vertex colours": soup.colors is not None,
+                "motion": moving,
+            }
+            without = ", ".join(what for what, had in lost.items() if had)
+            notes.append(f"simplified to {len(faces)} of {len(soup.faces)} faces{without and f', without {without}'}")
+            soup, moving = Soup(positions, faces, None, None, None), False
+        most = max(len(np.unique(faces)), len(faces) // 2)
+        if most > MOST_VERTICES:
+            raise InputError(
+                f"{self.path}: {counted(len(faces), 'face')} are more than the device can hold"
+                f" ({2 * MOST_VERTICES}): reduce them with --simplify {MOST_VERTICES}"
+            )
+        fixed = repair(positions, faces)
+        if not len(fixed.faces):
+            return None
+        if fixed.welded and not splits:
+            notes.append(f"{counted(fixed.welded, 'duplicate vertex')} welded")
+        notes += fixed.notes
+        if notes:
+            self.say(f"{_named(name)}{'; '.join(notes)}")
+
+        mesh = _mesh(soup, fixed, f"{self.path.stem} {name}".strip())
+        motion = None
+        if moving and self._clip is not None and rig is not None:
+            sources, first = fixed.sources(faces), first_of_equal(rig)
+            where = Blend.same(sources) if soup.sources is None else soup.sources.at(sources)
+            clip = replace(self._clip, rig=rig)
+            motion = Animation(clip, Blend(first[where.index], where.weight), self.scale, centre)
+        maps = self._wardrobe.maps(look)
+        return LoadedMesh(mesh, maps, motion, look, self.scale, tuple(centre.tolist()))
+
+
+def _mesh(soup: Soup, fixed: Repaired, name: str) -> Mesh:
+    def corners(values: Array | None) -> Array | None:
+        return None if values is None else fixed.corners(values[soup.faces])
+
+    mesh = Mesh(
+        fixed.positions, fixed.faces, corner_uvs=corners(soup.uvs), corner_colors=corners(soup.colors), name=name
+    )
+    normals = corners(soup.normals)
+    if normals is not None and not fixed.flipped.any():
+        mesh = replace(mesh, corner_normals=_own_normals(mesh, normals))
+    return mesh
+
+
+def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
+    """A file's normals (F, 3, 3), made unit, with smooth ones where it has none; None where they are smooth anyway."""
+    length = np.linalg.norm(normals, axis=2, keepdims=True)
+    smooth = mesh.normals[mesh.faces]
+    unit = np.where(np.isfinite(length) & (length > 1e-6), normals / np.maximum(length, 1e-6), smooth)
+    far = np.einsum("ijk,ijk->ij", unit, smooth) < math.cos(math.radians(OWN_NORMALS_DEGREES))
+    return unit if far.mean() > OWN_NORMALS_SHARE else None
+
+
+def _scale(
+    path: Path, file: Contents, positions: Sequence[Array], mm_per_unit: float | None, size_mm: float | None
+) -> float:
+    """Millimetres per unit."""
+    used = [at[np.unique(part.faces)] for part, at in zip(file.parts, positions, strict=True)]
+    low, high = np.min([u.min(axis=0) for u in used], axis=0), np.max([u.max(axis=0) for u in used], axis=0)
+    with np.errstate(over="ignore"):
+        side = float((high - low).max())
+        if side == 0:
+            raise InputError(f"{path}: the mesh has zero size")
+        scale = float(size_mm / side if size_mm is not None else mm_per_unit or file.mm_per_unit)
+    if not MIN_SIZE <= side * scale <= MAX_SIZE:
+        raise InputError(f"{path}: a size of {side * scale:g} mm is out of range ({MIN_SIZE:g} to {MAX_SIZE:g})")
+    return scale
+
+
+def _centred(positions: Array, faces: Array) -> tuple[Array, Array]:
+    """A point (3,), mm, and the positions as float32 relative to it: the origin, or the middle of what is far off."""
+    used = positions[np.unique(faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    middle = (low + high) / 2
+    far = np.abs(middle).max() > FAR * max(float((high - low).max()), MIN_SIZE)
+    centre = middle if far else np.zeros(3)
+    with np.errstate(over="ignore"):
+        return centre, (positions - centre).astype(np.float32)
+
+
+def _named(name: str) -> str:
+    return f"{name}: " if name else ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,123 @@
+"""From what a file says that a surface looks like to the textures that it wears."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.cutout import Mask
+from wgsss.scene.files.contents import Look, Part, Texture
+from wgsss.scene.images import read_map
+from wgsss.scene.material import SLOTS, Maps
+
+Array = npt.NDArray[Any]
+Say = Callable[[str], None]
+
+_NO_TEXTURES: dict[str, Any] = {f"{slot}_map": None for slot in SLOTS}
+FARTHEST_UV = 1e6
+"""Texture coordinates beyond this, or not finite, are taken as 0: no texel could be told from its neighbours there."""
+
+
+def lead(look: Look) -> Texture | None:
+    """The texture whose place on the surface all textures of the look share."""
+    return next((texture for slot in SLOTS if (texture := _texture(look, slot)) is not None), None)
+
+
+def wearable(part: Part, say: Say) -> Look:
+    """The part's look, less the textures that it cannot wear: those without texture coordinates, and those that lie
+    over other coordinates than the first."""
+    look, first = part.look, lead(part.look)
+    if first is None:
+        return look
+    if first.coordinates not in part.uvs:
+        where = f" {first.coordinates}" if first.coordinates else ""
+        say(f"{part.name}: its textures are left out, since it has no texture coordinates{where}")
+        return replace(look, **_NO_TEXTURES, cutoff=None)
+    for slot in SLOTS:
+        texture = _texture(look, slot)
+        if texture is not None and _place(texture) != _place(first):
+            say(f"{slot} texture {texture.name} left out: it lies over other coordinates than {first.name}")
+            look = replace(look, **{f"{slot}_map": None})
+    return look
+
+
+def shared(looks: list[Look], say: Say) -> Look:
+    """What all of some looks have in common; what differs is left out."""
+    first = looks[0]
+    for slot in SLOTS:
+        if any(_texture(look, slot) != _texture(first, slot) for look in looks):
+            say(f"{slot} textures left out: the parts do not share a single one")
+            first = replace(first, **{f"{slot}_map": None})
+    for name in ("base_color", "cutoff", "medium", "eta", "roughness", "specular", "normal_scale"):
+        if any(getattr(look, name) != getattr(first, name) for look in looks):
+            first = replace(first, **{name: getattr(Look(), name)})
+    return first
+
+
+def coordinates(part: Part, look: Look) -> Array | None:
+    """float64 (V, 2): where the look's textures are on the part, v down; None without texture coordinates."""
+    first = lead(look)
+    uvs = part.uvs.get(first.coordinates if first else 0)
+    if uvs is None or first is None or first.transform is None:
+        return uvs
+    matrix = np.asarray(first.transform)
+    with np.errstate(all="ignore"):  # what is not finite is counted later
+        return np.stack([uvs[:, 0] * row[0] + uvs[:, 1] * row[1] + row[2] for row in matrix], axis=1)
+
+
+class Wardrobe:
+    """Decodes the textures of a file, each once."""
+
+    def __init__(self, say: Say) -> None:
+        self._say = say
+        self._images: dict[Any, Array | None] = {}
+
+    def maps(self, look: Look) -> Maps:
+        """The look's textures. One that is damaged, or larger than a texture can be, is left out and said."""
+        found = Maps(*(self._image(_texture(look, slot), slot) for slot in SLOTS))
+        first = lead(look)
+        if first is not None:
+            found = replace(found, wrap=first.wrap, nearest=first.nearest)
+        return replace(found, normal_scale=look.normal_scale, tint=look.base_color)
+
+    def mask(self, look: Look) -> Mask | None:
+        """Where the surface is, if the look's alpha says so."""
+        if look.cutoff is None:
+            return None
+        alpha = np.full((1, 1), 255, np.uint8)
+        wrap = ("repeat", "repeat")
+        if look.base_color_map is not None:
+            wrap = look.base_color_map.wrap
+            found = self._image(replace(look.base_color_map, channels="A"), "alpha")
+            alpha = alpha if found is None else found
+        return Mask(look.alpha * alpha / 255.0, look.cutoff, wrap)
+
+    def _image(self, texture: Texture | None, slot: str) -> Array | None:
+        if texture is None:
+            return None
+        key = (texture.source, texture.channels, slot != "base_color")
+        if key not in self._images:
+            try:
+                self._images[key] = read_map(texture.source, texture.channels, linear=slot != "base_color")
+            except InputError as error:
+                reason = str(error)
+                if isinstance(texture.source, Path):
+                    reason = reason.removeprefix(f"{texture.source}: ")
+                self._say(f"{slot} texture left out: {texture.name}: {reason}")
+                self._images[key] = None
+        return self._images[key]
+
+
+def _texture(look: Look, slot: str) -> Texture | None:
+    found: Texture | None = getattr(look, f"{slot}_map")
+    return found
+
+
+def _place(texture: Texture) -> tuple[Any, ...]:
+    return texture.coordinates, texture.transform, texture.wrap

@@ -1,0 +1,49 @@
+"""The lights and the camera of a mesh file, as those of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wgsss.scene.bodies import LoadedFile
+from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from wgsss.scene.light import DirectionalLight, Light, PointLight
+from wgsss.scene.scene import Object
+
+NARROWEST, WIDEST = 0.05, 170.0  # degrees, of a camera's view
+
+
+def lights_of(file: LoadedFile) -> list[Light]:
+    """All lights of a file, lengths in mm."""
+    scale = file.bodies[0].mm_per_unit
+    found: list[Light] = []
+    for light in file.lights:
+        if light.kind == "directional":
+            found.append(DirectionalLight(light.direction, light.power))
+        else:
+            found.append(PointLight(_triple(np.asarray(light.position) * scale), light.power))
+    return found
+
+
+def camera_in(file: LoadedFile, things: Sequence[Object]) -> Camera | None:
+    """The first camera of a file, lengths in mm. It looks at the point of its axis that is nearest to the middle of the
+    things, so that it turns about that."""
+    if not file.cameras:
+        return None
+    seen, scale = file.cameras[0], file.bodies[0].mm_per_unit
+    points = np.concatenate([thing.placed for thing in things])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    eye, forward = np.asarray(seen.eye) * scale, np.asarray(seen.forward)
+    ahead = float((middle - eye) @ forward)
+    target = eye + max(ahead, float(np.ptp(points, axis=0).max()), 1e-3) * forward
+    place: dict[str, Any] = {"eye": _triple(eye), "target": _triple(target), "up": seen.up}
+    if seen.height is not None:
+        return OrthographicCamera(**place, height=seen.height * scale)
+    return PerspectiveCamera(**place, fov=min(max(seen.fov or 0.0, NARROWEST), WIDEST))
+
+
+def _triple(values: Any) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
