@@ -61,14 +61,19 @@ def add_scene_choices(parser: Parser) -> None:
     add = parser.add_argument
     add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
     add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
+    add("--animation", metavar="NAME", help="of a glTF: the animation to play, or none (default: its first)")
+    add("--simplify", metavar="N", type=count, help="of a mesh file: reduce each part of it to N faces, if it has more")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
     add("--camera", metavar="TABLE", type=table_of, help=_CAMERA)
     add("--light", metavar="TABLE", type=table_of, action="append", default=[], help=_LIGHT)
+    add("--file-camera", action="store_true", help="of a glTF: its own camera")
+    add("--file-lights", action="store_true", help="of a glTF: its own lights")
 
 
 def has_scene_choices(args: argparse.Namespace) -> bool:
     """Whether anything is to be other than a scene has it."""
-    return any((args.material, args.size_mm, args.vertices, args.camera, args.light))
+    chosen = (args.material, args.size_mm, args.animation, args.simplify, args.vertices, args.camera, args.light)
+    return any((*chosen, args.file_camera, args.file_lights))
 
 
 def add_method(parser: Parser) -> None:
@@ -88,9 +93,13 @@ def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
         name or args.scene,
         material=args.material,
         size_mm=args.size_mm,
+        animation=args.animation,
+        simplify=args.simplify,
         vertices=args.vertices,
         camera=args.camera,
         lights=args.light,
+        file_camera=args.file_camera,
+        file_lights=args.file_lights,
     )
 
 

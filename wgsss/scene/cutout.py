@@ -1,7 +1,7 @@
 """Cutting a surface along the outline of an alpha mask.
 
-A leaf is often a few large triangles with a picture whose alpha says where the leaf is. It is cut once, when the file is
-read. The mesh then has the leaf's outline, and no method, shadow map or reference has to know of masks.
+A leaf is often a few large triangles with a picture whose alpha says where the leaf is. It is cut once, when the file
+is read. The mesh then has the leaf's outline, and no method, shadow map or reference has to know of masks.
 """
 
 from __future__ import annotations

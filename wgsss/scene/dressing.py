@@ -19,7 +19,6 @@ from wgsss.scene.material import SLOTS, Maps
 Array = npt.NDArray[Any]
 Say = Callable[[str], None]
 
-_NO_TEXTURES: dict[str, Any] = {f"{slot}_map": None for slot in SLOTS}
 FARTHEST_UV = 1e6
 """Texture coordinates beyond this, or not finite, are taken as 0: no texel could be told from its neighbours there."""
 
@@ -38,12 +37,12 @@ def wearable(part: Part, say: Say) -> Look:
     if first.coordinates not in part.uvs:
         where = f" {first.coordinates}" if first.coordinates else ""
         say(f"{part.name}: its textures are left out, since it has no texture coordinates{where}")
-        return replace(look, **_NO_TEXTURES, cutoff=None)
+        return replace(look, base_color_map=None, normal_map=None, specular_map=None, cutoff=None)
     for slot in SLOTS:
         texture = _texture(look, slot)
         if texture is not None and _place(texture) != _place(first):
             say(f"{slot} texture {texture.name} left out: it lies over other coordinates than {first.name}")
-            look = replace(look, **{f"{slot}_map": None})
+            look = _without(look, slot)
     return look
 
 
@@ -53,10 +52,11 @@ def shared(looks: list[Look], say: Say) -> Look:
     for slot in SLOTS:
         if any(_texture(look, slot) != _texture(first, slot) for look in looks):
             say(f"{slot} textures left out: the parts do not share a single one")
-            first = replace(first, **{f"{slot}_map": None})
+            first = _without(first, slot)
     for name in ("base_color", "cutoff", "medium", "eta", "roughness", "specular", "normal_scale"):
         if any(getattr(look, name) != getattr(first, name) for look in looks):
-            first = replace(first, **{name: getattr(Look(), name)})
+            changed: dict[str, Any] = {name: getattr(Look(), name)}
+            first = replace(first, **changed)
     return first
 
 
@@ -80,7 +80,8 @@ class Wardrobe:
 
     def maps(self, look: Look) -> Maps:
         """The look's textures. One that is damaged, or larger than a texture can be, is left out and said."""
-        found = Maps(*(self._image(_texture(look, slot), slot) for slot in SLOTS))
+        base_color, normal, specular = (self._image(_texture(look, slot), slot) for slot in SLOTS)
+        found = Maps(base_color, normal, specular)
         first = lead(look)
         if first is not None:
             found = replace(found, wrap=first.wrap, nearest=first.nearest)
@@ -117,6 +118,11 @@ class Wardrobe:
 def _texture(look: Look, slot: str) -> Texture | None:
     found: Texture | None = getattr(look, f"{slot}_map")
     return found
+
+
+def _without(look: Look, slot: str) -> Look:
+    changed: dict[str, Any] = {f"{slot}_map": None}
+    return replace(look, **changed)
 
 
 def _place(texture: Texture) -> tuple[Any, ...]:

@@ -40,8 +40,9 @@ def load_scene(
     `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. For a
     mesh file, `size_mm` is the length of its longest side, `animation` the name of the one to play or "none", and
     `simplify` the greatest number of faces of a body; `file_camera` and `file_lights` take the camera and the lights
-    that it holds in place of the default ones. `vertices` is for a built-in scene: about how many it has. `camera`, and `lights` where
-    there are any, take the place of the scene's own; they and the material may be tables with the keys of a scene file.
+    that it holds in place of the default ones. For a built-in scene, `vertices` is about how many it has. `camera`,
+    and `lights` where there are any, take the place of the scene's own; they and the material may be tables with the
+    keys of a scene file.
 
     Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
     """

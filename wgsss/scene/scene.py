@@ -116,8 +116,8 @@ class Scene:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     def near_origin(self) -> Scene:
-        """The same scene moved so that what the camera looks at is at the origin, where that is far away: coordinates in
-        single precision would be too coarse there."""
+        """The same scene moved so that what the camera looks at is at the origin, where that is far away:
+        coordinates in single precision would be too coarse there."""
         camera = self.camera
         if math.dist((0, 0, 0), camera.target) <= FAR * math.dist(camera.eye, camera.target):
             return self
