@@ -72,6 +72,16 @@ SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what i
 }
 
 
+def check_size(nbytes: int, limit: str, what: str) -> None:
+    """Raise InputError where a buffer is larger than one of LIMITS."""
+    if nbytes > LIMITS[limit]:
+        needed, most = -(-nbytes >> 20), LIMITS[limit] >> 20
+        raise InputError(
+            f"{what} needs {needed} MiB in one buffer, more than the {most} MiB that devices take: the mesh is too"
+            " large, reduce it with --simplify"
+        )
+
+
 def texel_bytes(texture_format: str) -> int:
     """Bytes of one texel."""
     scalar, channels = FORMATS[texture_format]
@@ -169,6 +179,9 @@ class Gpu:
         data = data[..., None] if data.ndim == 2 else data
         data = data[None] if data.ndim == 3 else data
         layers, height, width, got = data.shape
+        largest = LIMITS["max-texture-dimension-2d"]
+        if max(width, height) > largest:
+            raise InputError(f"a texture of {width} x {height} texels is larger than the {largest} that devices take")
         if got != channels:
             raise ValueError(f"{texture_format} wants {channels} channels, got {got}")
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST | wgpu.TextureUsage.COPY_SRC
@@ -184,6 +197,7 @@ class Gpu:
         usage = (
             wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDEX | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
         )
+        check_size(data.nbytes if isinstance(data, np.ndarray) else len(data), "max-buffer-size", "a mesh's data")
         raw = data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
         return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
 
@@ -272,6 +286,7 @@ class Gpu:
 
     def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Any, Any]:
         """A buffer of at least `nbytes` from the pool, and the key to give it back with."""
+        check_size(nbytes, "max-buffer-size", "a pass")
         key = (1 << max(nbytes - 1, 255).bit_length(), usage)
         if self._free[key]:
             return self._free[key].pop(), key

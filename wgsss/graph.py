@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wgsss import wgsl
-from wgsss.gpu import Gpu, TextureKey
+from wgsss.gpu import Gpu, TextureKey, check_size
 from wgsss.passes import Dispatch, Draw, Encoder, Handle, Pass, Resource, pipeline, view_dimension
 from wgsss.wgsl import Binding, Module, WgslError
 
@@ -334,6 +334,9 @@ class Graph:
                     resource = self.gpu.view(resource, view_dimension(binding.type))
                 elif handle:
                     resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
+                if binding.space == "storage":
+                    size = handle.resource.nbytes if handle else resource.size
+                    check_size(size, "max-storage-buffer-binding-size", f"{item.name}: {name}")
             entries.append({"binding": binding.number, "resource": resource})
         group = self.gpu.device.create_bind_group(layout=layout, entries=entries) if entries else None
         return state, group

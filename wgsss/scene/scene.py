@@ -14,7 +14,7 @@ from wgsss.errors import InputError, unknown
 from wgsss.scene import checks
 from wgsss.scene.camera import Camera
 from wgsss.scene.checks import Triple
-from wgsss.scene.light import Light
+from wgsss.scene.light import Light, PointLight, RectLight, SphereLight
 from wgsss.scene.material import Material
 from wgsss.scene.mesh import Mesh
 
@@ -129,7 +129,12 @@ class Scene:
         return replace(
             self,
             objects=tuple(replace(o, translate=moved(o.translate)) for o in self.objects),
-            lights=tuple(replace(p, position=moved(p.position)) if hasattr(p, "position") else p for p in self.lights),
+            lights=tuple(
+                replace(light, position=moved(light.position))
+                if isinstance(light, PointLight | RectLight | SphereLight)
+                else light
+                for light in self.lights
+            ),
             camera=replace(camera, eye=moved(camera.eye), target=(0.0, 0.0, 0.0)),
         )
 
