@@ -39,10 +39,12 @@ def run(args: Any) -> None:
     if not glfw.init():
         raise InputError("no window can be opened: there is no display")
 
+    from dataclasses import fields
+
     from wgsss.gpu import default_gpu
     from wgsss.viewer.state import Source, State
     from wgsss.viewer.window import Window
 
-    source = Source(args.scene, args.size_mm, args.vertices)
+    source = Source(**{field.name: getattr(args, field.name) for field in fields(Source)})
     state = State.open(source, [method, other], args.material, args.camera, args.light)
     Window(state, default_gpu(), args.size).run()

@@ -26,10 +26,25 @@ class Source:
 
     scene: str
     size_mm: float | None = None
+    animation: str | None = None
+    simplify: int | None = None
     vertices: int | None = None
+    file_camera: bool = False
+    file_lights: bool = False
 
     def load(self) -> Scene:
-        return load_scene(self.scene, size_mm=self.size_mm, vertices=self.vertices)
+        rest = {name: value for name, value in vars(self).items() if name != "scene"}
+        return load_scene(self.scene, **rest)
+
+    def options(self, *, without: Sequence[str] = ()) -> list[str]:
+        """The words of a command line, less the options of some fields."""
+        words = []
+        for name, value in vars(self).items():
+            if name == "scene" or name in without or value in (None, False):
+                continue
+            option = f"--{name.replace('_', '-')}"
+            words += [option] if value is True else [option, str(value)]
+        return words
 
 
 @dataclass
@@ -101,13 +116,13 @@ class State:
         """The command line that draws a side as it is shown, its layer aside."""
         source, scene, method = self.source, self.scene, self.methods[side]
         words = ["wgsss", "render", source.scene]
-        for option, value in (("--size-mm", source.size_mm), ("--vertices", source.vertices)):
-            words += [] if value is None else [option, repr(value)]
+        moved = {"file_camera": scene.camera != self.opened.camera, "file_lights": scene.lights != self.opened.lights}
+        words += source.options(without=[name for name, changed in moved.items() if changed])
         if self.material is not None:
             words += ["--material", self.material if isinstance(self.material, str) else toml(self.material)]
-        if scene.camera != self.opened.camera:
+        if moved["file_camera"]:
             words += ["--camera", _table(scene.camera, CAMERAS)]
-        if scene.lights != self.opened.lights:
+        if moved["file_lights"]:
             words += [word for light in scene.lights for word in ("--light", _table(light, LIGHTS))]
         for name in ("exposure", "tone_map", "bloom"):
             if getattr(scene, name) != getattr(self.opened, name):
