@@ -20,6 +20,7 @@ DIRECTIONAL, POINT, PATCH = 0, 1, 2  # wgsl/light.wgsl
 WIDEST_VIEW = 120.0  # degrees: a light that sees the scene within less gets one view of it, another a cube of six
 PARALLEL = 1 / 2048  # scene radius over distance: from farther away, shadows are within a texel those of parallel light
 MAX_VIEWS = 256  # layers of an array texture that every adapter has
+_SMALLEST = 1e-3  # mm: of what a view shows, also where a body has been scaled to nothing
 _CUBE = (
     ((1, 0, 0), (0, 1, 0)),
     ((-1, 0, 0), (0, 1, 0)),
@@ -135,7 +136,7 @@ def _spiral(count: int, low: float) -> Array:
 def _ball(points: Array) -> tuple[Array, float]:
     """Centre and radius of a ball that holds the points."""
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return centre, max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-3)
+    return centre, max(float(np.linalg.norm(points - centre, axis=1).max()), _SMALLEST)
 
 
 def _angle(position: Any, points: Array) -> float:
@@ -171,7 +172,7 @@ def _parallel_view(towards: Array, points: Array) -> dict[str, Any]:
     camera = OrthographicCamera(tuple(centre + 2 * radius * towards), tuple(centre), _up(towards))
     turn = camera.view()[:3, :3]
     seen = points @ turn.T
-    extent = 1.02 * float(np.ptp(seen, axis=0)[:2].max())
+    extent = 1.02 * max(float(np.ptp(seen, axis=0)[:2].max()), _SMALLEST)
     shift = turn.T @ (0.5 * (seen.min(axis=0) + seen.max(axis=0)) - turn @ centre)
     camera = OrthographicCamera(tuple(camera.eye + shift), tuple(centre + shift), _up(towards), height=extent)
     return _view(camera, 0.5 * radius, 3.5 * radius, extent, perspective=0)

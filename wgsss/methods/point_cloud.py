@@ -37,6 +37,7 @@ sharp where light should have spread.
 _CLOSEST = 0.02  # of that distance: closer, R_d is level
 _MANTISSA, _EXPONENT = 9, 5  # bits of the table's entries
 _PROBES = np.geomspace(1e-3, 1e2, 64)  # mm: where profiles are compared
+_NO_AREA = 1e-30  # mm^2, of samples of a body that has been scaled to nothing: the middle of none is not defined
 _BEYOND = 1e-5  # share of the light that is left out for being far
 
 
@@ -256,7 +257,10 @@ def posed(body: Body, cloud: Cloud) -> Posed:
     """The samples of a body where they are now, and the boxes around them."""
     tree, at = cloud.tree, body.at(cloud.samples)
     area = at.area.astype(np.float64)
-    area *= body.mesh.area / area.sum()  # cells that cross faces change a little differently from their sample's
+    if body.mesh.shrunk:
+        area[:] = _NO_AREA
+    else:
+        area *= body.mesh.area / area.sum()  # cells that cross faces change a little differently from their sample's
     sums = tree.sums(area)
     nodes = {
         "low": tree.lowest(at.position),
