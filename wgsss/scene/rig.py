@@ -5,8 +5,8 @@ Equations and rules are those of the glTF 2.0 specification, sections 3.5 (nodes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,36 +45,48 @@ class Nodes:
     """float64 (4, 4) of those nodes that are given by a matrix, which takes the place of what a pose says of them"""
     rest: Pose
 
-    def __post_init__(self) -> None:
-        for node in range(len(self.parents)):
-            self.ancestors(node)
-
-    def ancestors(self, node: int) -> list[int]:
-        """The node itself, its parent, and so on up to the root."""
-        found = [node]
-        while self.parents[found[-1]] >= 0:
-            found.append(int(self.parents[found[-1]]))
-            if len(found) > len(self.parents):
-                raise InputError(f"node {node} is its own ancestor")
+    @cached_property
+    def levels(self) -> list[Array]:
+        """The nodes in order of their depth: int (n,) of those of each depth, beginning with the roots."""
+        order = np.argsort(self.parents, kind="stable")
+        first = np.searchsorted(self.parents[order], np.arange(len(self.parents) + 1))
+        found, level, left = [], np.flatnonzero(self.parents < 0), len(self.parents)
+        while len(level):
+            found.append(level)
+            left -= len(level)
+            level = np.concatenate([order[first[node] : first[node + 1]] for node in level])
+        if left:
+            ring = self._ring(np.setdiff1d(np.arange(len(self.parents)), np.concatenate([*found, level]))[0])
+            raise InputError(f"node {ring} is its own ancestor")
         return found
+
+    def __post_init__(self) -> None:
+        _ = self.levels
+
+    def _ring(self, node: int) -> int:
+        """The first node of the ring above a node."""
+        for _ in range(len(self.parents)):
+            node = int(self.parents[node])
+        ring = {node}
+        while (node := int(self.parents[node])) not in ring:
+            ring.add(node)
+        return min(ring)
 
     def world(self, pose: Pose) -> Array:
         """float64 (N, 4, 4): from each node's space to that of the scene."""
         local = np.zeros((len(self.parents), 4, 4))
-        local[:, :3, :3] = _turns(pose.rotation) * pose.scale[:, None, :]
-        local[:, :3, 3], local[:, 3, 3] = pose.translation, 1
-        for node, matrix in self.fixed.items():
-            local[node] = matrix
-        world, done = local.copy(), self.parents < 0
-        while not done.all():  # one level of the hierarchy after the other
-            ready = np.flatnonzero(~done & done[self.parents])
-            with np.errstate(all="ignore"):  # what is not finite is the caller's to find
-                world[ready] = world[self.parents[ready]] @ local[ready]
-            done[ready] = True
+        with np.errstate(all="ignore"):  # what is not finite is the caller's to find
+            local[:, :3, :3] = turns(pose.rotation) * pose.scale[:, None, :]
+            local[:, :3, 3], local[:, 3, 3] = pose.translation, 1
+            for node, matrix in self.fixed.items():
+                local[node] = matrix
+            world = local.copy()
+            for level in self.levels[1:]:
+                world[level] = world[self.parents[level]] @ local[level]
         return world
 
 
-def _turns(quaternions: Array) -> Array:
+def turns(quaternions: Array) -> Array:
     """Rotation matrices (N, 3, 3) of quaternions (N, 4)."""
     x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
     rows = [
@@ -119,6 +131,8 @@ class Part:
     targets: Array
     """float32 (T, V, 3): what each morph target adds to the positions"""
     skin: Skin | None
+    instance: Array | None = None
+    """float64 (4, 4): where in the node's space it stands; None where it stands as the node does"""
 
     def is_shaped(self, pose: Pose) -> bool:
         """Whether a pose does more than to place it with its node."""
@@ -132,7 +146,7 @@ class Part:
                 morphed = morphed + weight * target
         if self.skin is not None:
             return self.skin.carry(morphed, world)  # where the node itself stands does not matter then
-        matrix = world[self.node]
+        matrix = world[self.node] if self.instance is None else world[self.node] @ self.instance
         return np.einsum("ij,vj->vi", matrix[:3, :3], morphed) + matrix[:3, 3]
 
 
@@ -154,7 +168,10 @@ class Rig:
 
     def movers(self) -> set[int]:
         """The nodes on whose place any vertex depends."""
-        direct: Sequence[int] = [
-            int(node) for part in self.parts for node in ([part.node] if part.skin is None else part.skin.nodes)
-        ]
-        return {node for first in set(direct) for node in self.nodes.ancestors(first)}
+        found: set[int] = set()
+        for part in self.parts:
+            for node in [part.node] if part.skin is None else part.skin.nodes.tolist():
+                while node >= 0 and node not in found:
+                    found.add(node)
+                    node = int(self.nodes.parents[node])
+        return found

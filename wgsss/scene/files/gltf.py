@@ -1,0 +1,48 @@
+"""Reading glTF 2.0 files (.gltf and .glb): https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wgsss.scene.files.contents import Contents
+from wgsss.scene.files.gltf_animations import read_animations
+from wgsss.scene.files.gltf_container import damaged
+from wgsss.scene.files.gltf_document import Document
+from wgsss.scene.files.gltf_extensions import check_required, note_unknown
+from wgsss.scene.files.gltf_nodes import read_nodes
+from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf_parts import read_parts
+from wgsss.scene.files.gltf_rig import read_rig
+from wgsss.scene.files.gltf_views import read_cameras, read_lights
+
+MM_PER_UNIT = 1000.0
+"""its unit is the metre"""
+
+
+def read_gltf(path: Path) -> Contents:
+    """What the scene of a glTF file shows, and notes on what of it is left out. Images are not decoded.
+
+    Raises InputError, in one line that names the file and the place in it, for a file that is missing, damaged or
+    without triangles, that is not glTF 2, or that requires an extension which cannot be read.
+    """
+    with damaged(path):
+        document, notes = Document(path), Notes()
+        check_required(document)
+        stage = read_nodes(document)
+        placed = read_parts(document, stage, notes)
+        rig = read_rig(document, stage, placed, notes)
+        animations = {} if rig is None else read_animations(path, document, stage.nodes.rest, notes)
+        lights, cameras = read_lights(document, stage, notes), read_cameras(document, stage, notes)
+        note_unknown(document, notes)
+        parts = tuple(one.part for one in placed)
+        return Contents(
+            parts,
+            mm_per_unit=MM_PER_UNIT,
+            states_unit=True,
+            splits=len(parts) > 1 or any(part.normals is not None or part.uvs for part in parts),
+            lights=lights,
+            cameras=cameras,
+            rig=rig,
+            animations=animations,
+            notes=notes.lines(),
+        )

@@ -1,0 +1,90 @@
+"""The animations of a glTF file: their names, and their channels, read when asked for (glTF 2.0, section 3.11)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.scene.files.gltf_container import damaged
+from wgsss.scene.files.gltf_document import Document
+from wgsss.scene.files.gltf_fields import Item, plain
+from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.keyframes import INTERPOLATIONS, PATHS, Channel
+from wgsss.scene.rig import Pose
+
+Array = npt.NDArray[Any]
+
+
+def read_animations(
+    path: Path, document: Document, rest: Pose, notes: Notes
+) -> dict[str, Callable[[], tuple[Channel, ...]]]:
+    """What reads the channels of each animation, by its name, or its number where it has none.
+
+    Channels that move nothing that can be moved here are left out and noted. What reads the others raises InputError,
+    naming the file, where they do not fit together.
+    """
+    found: dict[str, Callable[[], tuple[Channel, ...]]] = {}
+    for number, animation in enumerate(document.all("animation")):
+        name = animation.get("name")
+        name = name if isinstance(name, str) and name else str(number)
+        for channel in animation.items("channels", "channel"):
+            reason = _left_out(channel, rest)
+            if reason:
+                notes.add(f"{reason}, and left out:", "animation channel")
+        found.setdefault(name, partial(_read, path, document, animation, rest, f"animation {plain(name)}"))
+    return found
+
+
+def _left_out(channel: Item, rest: Pose) -> str:
+    """Why a channel is not used; "" where it is."""
+    target = channel.item("target")
+    if target is None:
+        return ""
+    if target.extension("KHR_animation_pointer") is not None:
+        return "of KHR_animation_pointer"
+    if not target.has("node"):
+        return "without a node"
+    path = target.text("path")
+    if path not in PATHS:
+        return f"of an unknown path ({plain(path)})"
+    node = target.get("node")
+    if path == "weights" and isinstance(node, int) and 0 <= node < len(rest.weights) and not len(rest.weights[node]):
+        return "of the morph targets of a node that has none"
+    return ""
+
+
+def _read(path: Path, document: Document, animation: Item, rest: Pose, where: str) -> tuple[Channel, ...]:
+    with damaged(path):
+        named = Item(animation.values, where)
+        samplers = named.items("samplers", "sampler")
+        channels = named.items("channels", "channel")
+        return tuple(_channel(document, c, samplers, rest) for c in channels if not _left_out(c, rest))
+
+
+def _channel(document: Document, channel: Item, samplers: list[Item], rest: Pose) -> Channel:
+    target = channel.item("target")
+    if target is None:
+        raise channel.error("target is missing")
+    document.at("node", target.get("node"), channel.where)
+    node, path = target.whole("node"), target.text("path")
+    number = channel.whole("sampler")
+    if number >= len(samplers):
+        raise channel.error(f"there is no sampler {number}")
+    sampler = samplers[number]
+    kind = Item(sampler.values, channel.where).text("interpolation", "LINEAR", tuple(INTERPOLATIONS))
+    what = channel.where
+    times = document.numbers(sampler.get("input"), "SCALAR", f"{what}: times")[:, 0].astype(np.float64)
+    if not len(times) or times[0] < 0 or (np.diff(times) < 0).any():
+        raise channel.error("its times must rise, from 0 or later")
+    size = len(rest.weights[node]) if path == "weights" else getattr(rest, path).shape[1]
+    rows = len(times) * INTERPOLATIONS[kind] * (size if path == "weights" else 1)
+    values = document.numbers(sampler.get("output"), PATHS[path], f"{what}: {path}", rows).astype(np.float64)
+    values = values.reshape(len(times), INTERPOLATIONS[kind], size)
+    if path == "rotation" and not values[:, INTERPOLATIONS[kind] // 2].any(axis=1).all():
+        raise channel.error("a rotation is zero")
+    return Channel(node, path, kind, times, values)

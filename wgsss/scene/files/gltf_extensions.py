@@ -1,0 +1,76 @@
+"""Which extensions of glTF are read, which change nothing that is drawn, and what is said of all others."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from wgsss.errors import InputError
+from wgsss.scene.files.gltf_compression import DRACO, MESHOPT, PACKAGES, missing
+from wgsss.scene.files.gltf_document import Document
+from wgsss.scene.files.gltf_fields import plain, shown
+from wgsss.scene.files.gltf_notes import Notes
+
+READ = {
+    DRACO,
+    *MESHOPT,
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_avif",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_scatter",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_materials_volume_scatter",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+}
+HARMLESS = {
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+    "KHR_materials_emissive_strength",  # of the emission, which is noted itself
+    "KHR_materials_variants",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_lod",
+}
+"""those that leave the picture as it is that the file shows at first"""
+
+
+def check_required(document: Document) -> None:
+    """Raise InputError, naming them, for extensions that the file requires and that cannot be read."""
+    unknown = []
+    for value in document.root.array("extensionsRequired"):
+        if not isinstance(value, str):
+            raise InputError(f"extensionsRequired must be names, not {shown(value)}")
+        if value not in READ | HARMLESS:
+            unknown.append(plain(value))
+        elif value in PACKAGES and missing(value):
+            raise InputError(missing(value))
+    if unknown:
+        raise InputError(f"it requires {', '.join(unknown)}, which cannot be read")
+
+
+def note_unknown(document: Document, notes: Notes) -> None:
+    """Count the optional extensions that are not read, those apart that materials, textures and channels count."""
+    found: Counter[str] = Counter()
+    apart = ("materials", "textures", "animations")
+    waiting: list[Any] = [{key: value for key, value in document.root.values.items() if key not in apart}]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            extensions = value.get("extensions")
+            found.update(list(extensions) if isinstance(extensions, dict) else ())
+            waiting += [inner for key, inner in value.items() if key != "extras"]
+        elif isinstance(value, list):
+            waiting += value
+    for name, count in sorted(found.items()):
+        if name not in READ | HARMLESS:
+            notes.add(f"{plain(name)} left out: used in", "place", count)

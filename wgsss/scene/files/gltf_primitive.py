@@ -1,0 +1,122 @@
+"""The primitives of a glTF mesh as triangles: what they have at their vertices, checked and in plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.scene.files.gltf_attributes import FAN, TRIANGLES, Attributes
+from wgsss.scene.files.gltf_document import Document
+from wgsss.scene.files.gltf_fields import Item
+from wgsss.scene.files.gltf_notes import Notes
+
+Array = npt.NDArray[Any]
+Rows = Callable[..., Array]
+
+_NOT_DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """The triangles of a primitive, in the space of its mesh."""
+
+    item: Item
+    attributes: Attributes
+    vertices: int
+    """how many the file has"""
+    kept: Array | None
+    """int (V,): which of them are kept, where few are used; None for all"""
+    positions: Array
+    """float64 (V, 3)"""
+    faces: Array
+    """int64 (F, 3)"""
+    normals: Array | None
+    """float64 (V, 3), of any length"""
+    uvs: dict[int, Array]
+    """float64 (V, 2) by number of the set"""
+    colors: Array | None
+    """float64 (V, 3), 0 to 1; None also where they are all white"""
+
+    def read(self, name: str, kind: str | tuple[str, ...]) -> Array:
+        """A further attribute (V, C) of the vertices that are kept."""
+        return self.pick(self.attributes.read(name, kind, self.vertices))
+
+    def pick(self, values: Array) -> Array:
+        """Of values of all vertices those that are kept."""
+        return values if self.kept is None else values[self.kept]
+
+
+def read_primitive(document: Document, item: Item, notes: Notes) -> Primitive | None:
+    """A primitive; None where it has no triangles, which is noted. Raises InputError, naming it, for bad data."""
+    mode = item.whole("mode", TRIANGLES, high=FAN)
+    attributes = Attributes(document, item)
+    if mode in _NOT_DRAWN or "POSITION" not in attributes.names:
+        notes.add(f"{_NOT_DRAWN.get(mode, 'triangles without positions')} left out:", "primitive")
+        return None
+    positions = attributes.read("POSITION", "VEC3").astype(np.float64)
+    faces = attributes.faces(len(positions), notes)
+    if not len(faces):
+        return None
+    vertices, kept = len(positions), None
+    used = np.zeros(vertices, bool)
+    used[faces] = True
+    if 2 * used.sum() < vertices:  # one of many primitives that share the rows of their accessors
+        kept = np.flatnonzero(used)
+        positions, faces = positions[kept], np.searchsorted(kept, faces)
+
+    def rows(name: str, kind: str | tuple[str, ...]) -> Array:
+        values = attributes.read(name, kind, vertices, finite=False)
+        return values if kept is None else values[kept]
+
+    normals, uvs = _normals(attributes, rows, notes), _uvs(attributes, rows, notes)
+    colors = _colors(attributes, rows, notes)
+    return Primitive(item, attributes, vertices, kept, positions, faces, normals, uvs, colors)
+
+
+def _normals(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
+    if "NORMAL" not in attributes.names:
+        return None
+    normals = rows("NORMAL", "VEC3").astype(np.float64)
+    bad = ~np.isfinite(normals).all(axis=1)
+    if bad.any():
+        notes.add(f"normals that are not finite left out in {attributes.where}:", "vertex", int(bad.sum()))
+        normals[bad] = 0
+    return normals
+
+
+def _uvs(attributes: Attributes, rows: Rows, notes: Notes) -> dict[int, Array]:
+    found = {}
+    for number in attributes.numbered("TEXCOORD"):
+        uvs = rows(f"TEXCOORD_{number}", "VEC2").astype(np.float64)
+        bad = int((~np.isfinite(uvs)).any(axis=1).sum())
+        if bad:
+            what = f"TEXCOORD_{number} of {attributes.where} left out, not finite at"
+            notes.add(what, "vertex", bad)
+        else:
+            found[number] = uvs
+    return found
+
+
+def _colors(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
+    """The first set of vertex colours. Whole numbers are shares of their largest value even if the file forgot to say
+    so."""
+    sets = attributes.numbered("COLOR")
+    if any(number > 0 for number in sets):
+        notes.add("vertex colours beyond COLOR_0 left out:", "primitive")
+    if 0 not in sets:
+        return None
+    colors = rows("COLOR_0", ("VEC3", "VEC4"))
+    if colors.dtype == np.int64:
+        colors = colors / (255 if colors.max() <= 255 else 65535)
+    bad = int((~np.isfinite(colors)).any(axis=1).sum())
+    if bad:
+        notes.add(f"COLOR_0 of {attributes.where} left out, not finite at", "vertex", bad)
+        return None
+    colors = np.clip(colors, 0, 1)
+    if colors.shape[1] == 4 and (colors[:, 3] < 1).any():
+        notes.add("alpha of vertex colours left out:", "primitive")
+    return None if (colors[:, :3] == 1).all() else colors[:, :3]
