@@ -14,13 +14,14 @@ import numpy as np
 
 from wgsss import wgsl
 from wgsss.errors import InputError
+from wgsss.scene.images import MAX_SIDE
 
 os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())  # unset, it makes drivers print noise
 
 # What is asked of every adapter: WebGPU's own defaults. Asking for nothing would grant the adapter's limits, and what
 # runs on a generous software driver would then fail on a GPU.
 LIMITS = {
-    "max-texture-dimension-2d": 8192,
+    "max-texture-dimension-2d": MAX_SIDE,
     "max-texture-array-layers": 256,
     "max-bind-groups": 4,
     "max-sampled-textures-per-shader-stage": 16,

@@ -10,7 +10,10 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
-from wgsss.scene.images import read_radiance
+from wgsss.scene.images import read_sky
+
+BRIGHTEST = 1e9
+"""W/(m^2 sr), of an environment; the sun has 2e7"""
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,8 @@ class SphereLight:
 class EnvironmentLight:
     """Light from all around, constant or from a latitude-longitude image.
 
+    Small bright regions of an image light the scene as directional lights do (`wgsss.bake.suns`).
+
     A direction (x, y, z) is found at u = 1/2 + atan2(x, -z) / 2 pi and v = acos(y) / pi: the middle of the image lies
     along -z, its top along +y, and +x to the right of the middle.
     """
@@ -102,7 +107,7 @@ class EnvironmentLight:
     radiance: Triple = (1.0, 1.0, 1.0)
     """RGB, W/(m^2 sr); multiplies the image where there is one"""
     file: str | None = None
-    """a latitude-longitude image, .hdr or .exr"""
+    """a latitude-longitude image, or a cube that says so, .hdr or .exr (`wgsss.scene.images.read_sky`)"""
     rotation: float = 0.0
     """degrees by which the environment is turned about +y, counter-clockwise seen from above"""
 
@@ -115,11 +120,16 @@ class EnvironmentLight:
     def pixels(self) -> npt.NDArray[np.float32]:
         """float32 (H, W, 3): radiance by latitude (top row +y) and longitude, before `rotation`; 1 x 1 without a file.
 
-        Negative values are clamped to zero. Raises InputError for a file that is missing, damaged or holds NaN.
+        Negative values are clamped to zero. Raises InputError for a file that is missing, damaged or holds NaN, and
+        for radiance above BRIGHTEST.
         """
-        if self.file is None:
-            return np.array([[self.radiance]], np.float32)
-        return read_radiance(self.file) * np.asarray(self.radiance, np.float32)
+        pixels = np.ones((1, 1, 3), np.float32) if self.file is None else read_sky(self.file)
+        with np.errstate(over="ignore"):
+            pixels = pixels * np.asarray(self.radiance, np.float32)
+        if pixels.max() > BRIGHTEST:
+            of = "" if self.file is None else f"{self.file}: "
+            raise InputError(f"{of}an environment has at most {BRIGHTEST:g} W/(m^2 sr), not {pixels.max():g}")
+        return pixels
 
 
 Light = DirectionalLight | PointLight | RectLight | SphereLight | EnvironmentLight

@@ -1,0 +1,94 @@
+"""Textures as the passes take them: 8 bits for each of the channels that are asked for."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.images.pixels import named, read_pixels
+
+Array = npt.NDArray[Any]
+
+_LUMA = (19595, 38470, 7471)  # ITU-R BT.601, in units of 2^-16: what Pillow makes grey by
+
+
+def read_map(source: str | Path | bytes, mode: str, *, linear: bool = False) -> npt.NDArray[np.uint8]:
+    """A texture in 8 bits, from an image file of any depth or the encoded bytes of one.
+
+    Args:
+        mode: "RGB" for (H, W, 3), "RGBA" for (H, W, 4), "L" for (H, W), the grey or the luminance of colours, "A" for
+            (H, W), alpha, which is 255 where the image has none.
+        linear: whether the map holds data (normals, thickness, a factor), not colours. It matters for images of
+            floating point, which hold linear colours: those of colour maps are encoded as sRGB, those of data kept.
+
+    Raises:
+        InputError: as `read_pixels`, and for numbers that are not finite. Values outside 0 to 1 are clamped, with a
+            warning.
+    """
+    pixels = read_pixels(source)
+    if pixels.dtype == np.float32:
+        pixels = _finite(pixels, named(source))
+        if not linear:
+            colours = pixels.shape[2] - (pixels.shape[2] in (2, 4))
+            pixels[..., :colours] = _srgb(pixels[..., :colours])
+    return _eight_bits(_channels(pixels, mode))
+
+
+def _finite(pixels: Array, where: str) -> Array:
+    """Clamped to 0 to 1, with a warning where this changes something."""
+    bad = int((~np.isfinite(pixels)).any(axis=2).sum())
+    if bad:
+        raise InputError(f"{where}{bad} pixels are not finite numbers")
+    outside = int(((pixels < 0.0) | (pixels > 1.0)).any(axis=2).sum())
+    if outside:
+        warnings.warn(f"{where}{outside} pixels outside 0 to 1 are clamped", stacklevel=3)
+    return np.clip(pixels, 0.0, 1.0)
+
+
+def _srgb(linear: Array) -> Array:
+    """IEC 61966-2-1."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def _channels(pixels: Array, mode: str) -> Array:
+    """The channels of a mode, at the depth of the image."""
+    channels = pixels.shape[2]
+    colours = pixels[..., :1] if channels < 3 else pixels[..., :3]
+    full = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
+    alpha = pixels[..., -1] if channels in (2, 4) else np.full(pixels.shape[:2], full, pixels.dtype)
+    if mode == "A":
+        return alpha
+    if mode == "L":
+        return _luma(colours)
+    colours = np.broadcast_to(colours, (*pixels.shape[:2], 3))
+    if mode == "RGB":
+        return colours
+    if mode == "RGBA":
+        return np.dstack([colours, alpha])
+    raise ValueError(f"a texture is read as RGB, RGBA, L or A, not {mode!r}")
+
+
+def _luma(colours: Array) -> Array:
+    if colours.shape[2] == 1:
+        return colours[..., 0]
+    if colours.dtype == np.float32:
+        weighted = [c * np.float32(w / 65536) for c, w in zip(np.moveaxis(colours, 2, 0), _LUMA, strict=True)]
+        return sum(weighted[1:], weighted[0])
+    total = np.full(colours.shape[:2], 0x8000, np.uint32)
+    for i, weight in enumerate(_LUMA):
+        total += colours[..., i].astype(np.uint32) * np.uint32(weight)
+    return (total >> 16).astype(colours.dtype)
+
+
+def _eight_bits(pixels: Array) -> npt.NDArray[np.uint8]:
+    """Rounded to 8 bits, in memory of its own."""
+    if pixels.dtype == np.uint16:
+        pixels = (pixels.astype(np.uint32) + 128) // 257
+    elif pixels.dtype == np.float32:
+        pixels = pixels * 255.0 + 0.5
+    return np.ascontiguousarray(pixels).astype(np.uint8)

@@ -1,0 +1,72 @@
+"""Radiance from .hdr and .exr files, and skies: radiance over all directions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.images.cube import lat_long_of_cube
+from wgsss.scene.images.exr import read_exr
+from wgsss.scene.images.files import require_file
+from wgsss.scene.images.hdr import read_hdr
+
+Array = npt.NDArray[Any]
+
+_TOLERANCE = 0.02  # of the height: some writers lose or add a few rows or columns
+
+
+def read_radiance(path: str | Path) -> npt.NDArray[np.float32]:
+    """float32 (H, W, 3), linear RGB of Rec. 709 and not negative, from a Radiance .hdr or an OpenEXR .exr file.
+
+    Raises InputError for a file that is missing, damaged, of another kind or too large, or holds a number that is not
+    finite.
+    """
+    return _read(Path(path))[0]
+
+
+def read_sky(path: str | Path) -> npt.NDArray[np.float32]:
+    """Radiance over latitude and longitude, as `read_radiance` gives it: of twice the width that it has in height, or a
+    single pixel.
+
+    An OpenEXR file whose attribute `envmap` says that it is a cube is converted. Raises InputError for an image of
+    another shape, too.
+    """
+    path = Path(path)
+    pixels, cube = _read(path)
+    if cube:
+        return lat_long_of_cube(pixels)
+    height, width = pixels.shape[:2]
+    if (height, width) != (1, 1) and abs(width - 2 * height) > max(1, 2 * _TOLERANCE * height):
+        raise InputError(
+            f"{path}: {width} x {height} pixels are no sky: it is a latitude-longitude image, twice as wide as high,"
+            " or an OpenEXR cube with the attribute envmap"
+        )
+    return pixels
+
+
+def _read(path: Path) -> tuple[npt.NDArray[np.float32], bool]:
+    """Radiance, and whether the image is a cube of six faces."""
+    if path.suffix.lower() not in (".hdr", ".exr"):
+        raise InputError(f"{path}: an environment image must be a .hdr or .exr file")
+    require_file(path)
+    try:
+        with path.open("rb") as file:
+            begins = file.read(4)
+        named = read_exr if path.suffix.lower() == ".exr" else read_hdr
+        reader = read_hdr if begins[:2] == b"#?" else read_exr if begins == b"\x76\x2f\x31\x01" else named
+        pixels, cube = reader(path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or 'input/output error'})") from None
+    except MemoryError:
+        raise InputError(f"{path}: there is not enough memory for the image") from None
+    bad = int((~np.isfinite(pixels)).any(axis=2).sum())
+    if bad:
+        raise InputError(f"{path}: {bad} pixels are not finite numbers")
+    # Resampling filters with negative lobes, and colours that Rec. 709 does not have, leave negative radiance.
+    return np.maximum(pixels, 0.0, dtype=np.float32), cube
