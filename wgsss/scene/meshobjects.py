@@ -45,7 +45,7 @@ def objects_of(
             moved = thing.matrix @ [*body.translate, 1.0]
             thing = replace(thing, translate=tuple(moved[:3].tolist()))
         found.append(thing)
-    _check_size(found, where)
+    _check_size(found, file, chosen, where)
     return tuple(found)
 
 
@@ -77,21 +77,26 @@ def _per_mm(sigma: Triple, mm_per_unit: float) -> Triple:
     return red, green, blue
 
 
-def _check_size(things: list[Object], where: str) -> None:
-    points = np.concatenate([thing.placed for thing in things])
+def _check_size(found: list[Object], file: LoadedFile, chosen: Chosen | None, where: str) -> None:
+    """Warn of the first material in whose light the mesh is too large or too small to show diffusion."""
+    points = np.concatenate([thing.placed for thing in found])
     side = float(np.ptp(points, axis=0).max())
-    for material in {id(thing.material): thing.material for thing in things}.values():
+    for thing, body in zip(found, file.bodies, strict=True):
+        material = thing.material
         try:
             reach = float(material.profile.range(0.01).max())
         except InputError:  # of layers that are too thin for diffusion: methods say so when they need it
             continue
         if LEAST * reach <= side <= GREATEST * reach:
             continue
-        fit = float(f"{FITTING * reach:.2g}")
         effect = "looks as if opaque" if side > reach else "glows as a whole"
+        fit = float(f"{FITTING * reach:.2g}")
+        advice = f"; if its unit is another one, --size-mm {fit:g} would fit"
+        if chosen is None and body.look.medium is not None:
+            advice = ""  # the file's own medium is scaled with the mesh
         warnings.warn(
             f"{where}: the mesh is {side:.3g} mm long and light spreads {reach:.2g} mm in {material.name}, so it "
-            f"{effect}; if its unit is another one, --size-mm {fit:g} would fit",
-            stacklevel=2,
+            f"{effect}{advice}",
+            stacklevel=3,
         )
         return

@@ -5,6 +5,7 @@ Equations and rules are those of the glTF 2.0 specification, sections 3.5 (nodes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
