@@ -243,7 +243,7 @@ def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_pa
     share = np.zeros((12, 4))
     share[:8, 1] = 1
     file.tree.meshes[0].primitives[0].attributes.WEIGHTS_0 = file.add(share, "VEC4")
-    with pytest.warns(UserWarning, match=r"^arm\.glb: 4 vertices without joint weights carried"):
+    with pytest.warns(UserWarning, match=r"^arm\.glb: .*no joint weights: 4 vertices$"):
         loaded = load_mesh(file.save(tmp_path / "arm.glb"), mm_per_unit=1)
     still = loaded.mesh.positions[:, 1] == 2
     assert at(loaded, 1)[still] == pytest.approx(loaded.mesh.positions[still])
@@ -545,7 +545,7 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "matrices of another kind": (
         lambda f: setattr(f.tree.skins[0], "inverseBindMatrices", 0),
-        "skin 0: inverse bind matrices: accessor 0 must be MAT4, not VEC4",
+        "skin 0: inverse bind matrices: accessor 0 must be MAT4, not 'VEC4'",
     ),
     "matrix not finite": (
         lambda f: setattr(f.tree.skins[0], "inverseBindMatrices", f.add(np.full((2, 16), np.inf), "MAT4")),
@@ -563,7 +563,7 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "far too large": (
         lambda f: (setattr(f.tree.nodes[1], "scale", [1e200] * 3), setattr(f.tree.nodes[2], "scale", [1e200] * 3)),
-        "its nodes are beyond all bounds",
+        "node 2: its place is beyond all bounds",
     ),
     "too few values": (
         lambda f: setattr(sampler(f), "output", f.add(np.ones((2, 4)), "VEC4")),
@@ -603,11 +603,11 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "weights of other targets": (
         lambda f: setattr(f.tree.meshes[0], "weights", [1.0, 1.0]),
-        "node 0: weights of its morph targets must be 0 finite numbers",
+        "node 0: weights must be 0 finite numbers",
     ),
     "not what it should be": (
         lambda f: setattr(f.tree.animations[0].channels[0], "target", None),
-        "damaged: its skins or animations cannot be read ('NoneType' object has no attribute 'node')",
+        "animation Bend, channel 0: target is missing",
     ),
 }
 
@@ -635,8 +635,8 @@ def test_a_mesh_that_vanishes_for_a_while(tmp_path: Path) -> None:
     file = arm()
     file.animate((1, "scale", (0, 1, 2), ((1, 1, 1), (0, 0, 0), (1, 1, 1))), name="Blink")
     file.tree.animations.reverse()
-    with pytest.raises(InputError, match=r"arm: a size of 0 mm is out of range .*, 1 s into its motion$"):
-        load_scene(file.save(tmp_path / "arm.glb"))
+    thing = load_scene(file.save(tmp_path / "arm.glb"), size_mm=100).objects[0]
+    assert [thing.at(time_s).mesh.shrunk for time_s in (0.0, 0.5, 1.0, 1.5, 2.0)] == [False, False, True, False, False]
 
 
 def test_a_mesh_of_other_vertices_is_refused(tmp_path: Path) -> None:

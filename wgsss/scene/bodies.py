@@ -134,7 +134,7 @@ class _File:
             self._clip = choose_clip(self.contents, animation)
             self._placed = placed(self.contents.parts, self.contents.rig)
         except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+            raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
         bad = sum(int((~np.isfinite(positions)).any(axis=1).sum()) for positions in self._placed)
         if bad:
             raise InputError(f"{path}: {bad} of {sum(map(len, self._placed))} positions are not finite numbers")
