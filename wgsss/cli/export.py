@@ -1,4 +1,4 @@
-"""`wgsss export`: a scene for another renderer."""
+"""`wgsss export`: a scene for other renderers."""
 
 from __future__ import annotations
 
@@ -6,23 +6,38 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.cli import arguments
+from wgsss.errors import InputError
 
 
 def declare(commands: Any) -> None:
-    parser = arguments.command(commands, "export", run, "write a scene for Mitsuba 3")
+    parser = arguments.command(commands, "export", run, "write a scene for Mitsuba 3 or as glTF")
     arguments.add_scene(parser)
     add = parser.add_argument
-    add("--mitsuba", metavar="DIR", type=Path, required=True, help="the folder to write scene.xml and its files to")
+    add("--mitsuba", metavar="DIR", type=Path, help="the folder to write scene.xml and its files to")
+    add("--gltf", metavar="FILE.glb", type=Path, help="the glTF file to write")
     add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
     add("--time", metavar="S", type=arguments.number, default=0.0, help="of a moving scene, seconds (default: 0)")
 
 
 def run(args: Any) -> None:
-    from wgsss.reference.mitsuba_scene import export
+    from wgsss import output_gltf
+    from wgsss.output import check_output
+    from wgsss.reference import mitsuba_scene
 
+    if args.mitsuba is None and args.gltf is None:
+        raise InputError("nothing to write: give --mitsuba DIR, --gltf FILE.glb, or both")
+    if not all(args.size):
+        raise InputError(f"--size must be at least 1x1, not {args.size[0]}x{args.size[1]}")
+    if args.gltf is not None:
+        check_output(args.gltf, output_gltf.FORMATS)
     scene = arguments.load_scene(args).at(args.time)
-    written = export(scene, args.mitsuba, args.size)
+    written, lines = [], []
+    if args.mitsuba is not None:
+        files = mitsuba_scene.export(scene, args.mitsuba, args.size)
+        written += files
+        lines.append(f"{files[0]}: {scene.name}, {len(files)} files; render it with 'mitsuba {files[0]}'")
+    if args.gltf is not None:
+        written.append(output_gltf.export(scene, args.gltf, args.size[0] / args.size[1]))
+        lines.append(f"{args.gltf}: {scene.name}, glTF")
     result = {"files": [str(file) for file in written], "scene": scene.name, "size": args.size, "time": args.time}
-    arguments.tell(
-        args, result, f"{written[0]}: {scene.name}, {len(written)} files; render it with 'mitsuba {written[0]}'"
-    )
+    arguments.tell(args, result, "\n".join(lines))

@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
 from wgsss.errors import InputError
@@ -114,17 +113,13 @@ def data_of(uri: str) -> bytes | None:
 def file_of(folder: Path, uri: str) -> Path:
     """The file that a relative URI names, percent-encoded or not. Raises InputError where there is no such file."""
     for name in dict.fromkeys((unquote(uri), uri, unquote(uri).replace("\\", "/"))):
+        found = folder / name
         try:
-            found = folder / name
-            if found.is_file():
-                return found
-            if found.exists():
-                raise InputError(f"'{plain(name)}' is not a regular file")
+            there, regular = found.exists(), found.is_file()
         except (OSError, ValueError):  # a name too long, or with a zero byte
             continue
+        if regular:
+            return found
+        if there:
+            raise InputError(f"'{plain(name)}' is not a regular file")
     raise InputError(f"there is no file '{plain(unquote(uri))}' beside it")
-
-
-def uri_of(item: Item) -> Any:
-    """The URI of a buffer or image; None where it has none."""
-    return item.text("uri") if item.has("uri") else None

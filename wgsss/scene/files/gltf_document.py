@@ -81,12 +81,7 @@ class Document:
         item = self.at("buffer", index, what)
         number = int(index)
         if number not in self._buffers:
-            try:
-                self._buffers[number] = memoryview(self._load(item, number))
-            except OSError as error:
-                raise item.error(f"it cannot be read ({plain(error.strerror or str(error))})") from None
-            except InputError as error:
-                raise item.error(str(error)) from None
+            self._buffers[number] = memoryview(self._load(item, number))
         return self._buffers[number]
 
     def view(self, index: Any, what: str) -> tuple[memoryview, int | None]:
@@ -173,11 +168,16 @@ class Document:
     def _load(self, item: Item, number: int) -> bytes:
         if not item.has("uri"):
             if number or self._binary is None:
-                raise InputError("it has no data")
+                raise item.error("it has no data")
             return self._binary
         uri = item.text("uri")
-        data = data_of(uri)
-        return file_of(self.folder, uri).read_bytes() if data is None else data
+        try:
+            data = data_of(uri)
+            return file_of(self.folder, uri).read_bytes() if data is None else data
+        except InputError as error:
+            raise item.error(str(error)) from None
+        except OSError as error:
+            raise item.error(f"it cannot be read ({plain(error.strerror or str(error))})") from None
 
 
 def as_floats(values: Array, normalized: bool, what: str, finite: bool = True) -> Array:

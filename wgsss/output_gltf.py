@@ -1,0 +1,183 @@
+"""A scene as a glTF file, for other programs: meshes, materials with their media, lights and the camera.
+
+Lengths become metres, the unit of glTF, and coefficients 1/m. Radiometry becomes the photometry of
+KHR_lights_punctual one to one: 1 W/m^2 is written as 1 lx and 1 W/sr as 1 cd, as the reader takes them.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss import __version__
+from wgsss.output import check_output, replacing
+from wgsss.scene import DirectionalLight, Material, Mesh, OrthographicCamera, PointLight, Scene
+from wgsss.scene.files.gltf_media import VOLUME, VOLUME_SCATTER, written
+from wgsss.scene.files.gltf_writer import Writer
+from wgsss.scene.light import Light
+
+Array = npt.NDArray[Any]
+
+FORMATS = (".glb",)
+_LIGHTS = "KHR_lights_punctual"
+_PER_MM = 1e-3
+"""metres"""
+
+
+def export(scene: Scene, path: str | Path, aspect: float = 1.0) -> Path:
+    """Write `scene`, as it stands, to a .glb file, and give back its path.
+
+    `aspect` is the width of the image over its height, which glTF wants of an orthographic camera. What glTF has no
+    place for is told in one warning. Raises InputError for a place that cannot be written.
+    """
+    path = check_output(path, FORMATS)
+    data, notes = glb(scene, aspect)
+    with replacing(path) as (file,):
+        file.write_bytes(data)
+    if notes:
+        warnings.warn(f"{scene.name}: the glTF file differs: {'; '.join(notes)}", stacklevel=2)
+    return path
+
+
+def glb(scene: Scene, aspect: float = 1.0) -> tuple[bytes, list[str]]:
+    """The .glb file of a scene, and notes on what of it glTF has no place for."""
+    writer, notes = Writer(f"wgsss {__version__}"), dict[str, None]()
+    nodes = []
+    for thing in scene.objects:
+        material = writer.add("materials", _material(writer, thing.material, _depth(thing.mesh), notes))
+        mesh = writer.add("meshes", {"name": thing.mesh.name, "primitives": [_primitive(writer, thing.mesh, material)]})
+        nodes.append(writer.add("nodes", {"name": thing.mesh.name, "mesh": mesh, **_placed(thing.matrix)}))
+    nodes += _lights(writer, scene.lights, notes)
+    nodes.append(_camera(writer, scene, aspect))
+    if scene.exposure or scene.bloom:
+        notes["exposure and bloom are left out"] = None
+    return writer.glb(nodes), list(notes)
+
+
+def _placed(matrix: Array) -> dict[str, Any]:
+    """A node's field for a placement (4, 4) in mm."""
+    matrix = matrix.copy()
+    matrix[:3, 3] *= _PER_MM
+    return {} if np.array_equal(matrix, np.eye(4)) else {"matrix": matrix.T.ravel().tolist()}
+
+
+def _depth(mesh: Mesh) -> float:
+    """About how thick a mesh is, m: its shortest side, a hundredth of its longest at least."""
+    sides = np.ptp(mesh.bounds.astype(np.float64), axis=0)
+    return float(max(sides.min(), sides.max() / 100)) * _PER_MM
+
+
+def _primitive(writer: Writer, mesh: Mesh, material: int) -> dict[str, Any]:
+    """The triangles of a mesh, its vertices split where corners have normals or texture coordinates of their own."""
+    vertex = mesh.faces.ravel()
+    apart = [vertex.astype(np.uint64)]
+    for values in (mesh.corner_uvs, mesh.corner_normals):
+        if values is not None:
+            apart += list(np.ascontiguousarray(values + np.float32(0)).view(np.uint32).reshape(len(vertex), -1).T)
+    first, indices = _distinct(apart)
+    at = vertex[first]
+    attributes = {
+        "POSITION": writer.rows((mesh.positions[at].astype(np.float64) * _PER_MM).astype(np.float32), bounds=True),
+        "NORMAL": writer.rows(mesh.shading_normals.reshape(-1, 3)[first]),
+    }
+    if mesh.corner_uvs is not None:
+        attributes["TEXCOORD_0"] = writer.rows(mesh.corner_uvs.reshape(-1, 2)[first])
+    faces = writer.rows(indices.reshape(-1, 1).astype(np.uint32))
+    return {"attributes": attributes, "indices": faces, "material": material}
+
+
+def _distinct(columns: list[Array]) -> tuple[Array, Array]:
+    """The first of each of the distinct rows of some columns of whole numbers (N,), and for each row which it is."""
+    key = columns[0]
+    for column in columns[1:]:
+        other = np.unique(column, return_inverse=True)[1]
+        key = np.unique(key, return_inverse=True)[1] * (other.max() + 1) + other
+    _, first, which = np.unique(key, return_index=True, return_inverse=True)
+    return first, which
+
+
+def _material(writer: Writer, material: Material, depth: float, notes: dict[str, None]) -> dict[str, Any]:
+    maps = material.maps
+    color = {} if maps.base_color is None else {"Texture": writer.texture(maps.base_color)}
+    factor = list(material.base_color)
+    extensions = writer.extended("KHR_materials_ior", {"ior": material.eta})
+    if material.specular != 1 or maps.specular is not None:
+        specular: dict[str, Any] = {"specularFactor": material.specular}
+        if maps.specular is not None:
+            white = np.full((*maps.specular.shape, 3), 255, np.uint8)
+            specular["specularTexture"] = writer.texture(np.dstack([white, maps.specular]))
+        extensions |= writer.extended("KHR_materials_specular", specular)
+    if material.sigma_a is None or material.sigma_s_prime is None:
+        notes[f"'{material.name}' has no coefficients, and so no medium"] = None
+    else:
+        sigma_a, sigma_s = (np.array(sigma) / _PER_MM for sigma in (material.sigma_a, material.sigma_s_prime))
+        volume, scatter = written(sigma_a, sigma_s)
+        through = {"diffuseTransmissionFactor": 1.0, **_named("diffuseTransmissionColor", factor, color)}
+        extensions |= writer.extended("KHR_materials_diffuse_transmission", through)
+        extensions |= writer.extended(VOLUME, {"thicknessFactor": depth, **volume})
+        extensions |= writer.extended(VOLUME_SCATTER, scatter)
+    if material.color_after != 1 or material.transport is not None:
+        notes["color_after and transport are left out"] = None
+    pbr = {"metallicFactor": 0.0, "roughnessFactor": material.roughness, **_named("baseColor", [*factor, 1.0], color)}
+    found = {"name": material.name, "pbrMetallicRoughness": pbr, "extensions": extensions}
+    if maps.normal is not None:
+        found["normalTexture"] = writer.texture(maps.normal)
+    return found
+
+
+def _named(name: str, factor: list[float], texture: dict[str, Any]) -> dict[str, Any]:
+    """A factor and its texture, if any, under their names in glTF."""
+    return {f"{name}Factor": factor, **{f"{name}{key}": value for key, value in texture.items()}}
+
+
+def _lights(writer: Writer, lights: tuple[Light, ...], notes: dict[str, None]) -> list[int]:
+    """The nodes of directional and point lights; others are noted."""
+    found, nodes = [], []
+    for light in lights:
+        matrix = np.eye(4)
+        if isinstance(light, DirectionalLight):
+            kind, power, matrix[:3, :3] = "directional", light.irradiance, _looking(np.array(light.direction))
+        elif isinstance(light, PointLight):
+            kind, power, matrix[:3, 3] = "point", light.intensity, light.position
+        else:
+            notes[f"{type(light).__name__} is left out"] = None
+            continue
+        intensity = max(power)
+        color = [value / intensity for value in power] if intensity else [1.0, 1.0, 1.0]
+        found.append({"type": kind, "intensity": intensity, "color": color})
+        extensions = writer.extended(_LIGHTS, {"light": len(found) - 1})
+        nodes.append(writer.add("nodes", {"extensions": extensions, **_placed(matrix)}))
+    if found:
+        writer.put(_LIGHTS, {"lights": found})
+    return nodes
+
+
+def _looking(direction: Array) -> Array:
+    """A rotation (3, 3) that takes -z to a direction."""
+    back = -direction / np.linalg.norm(direction)
+    side = np.cross(np.eye(3)[np.argmin(np.abs(back))], back)
+    side /= np.linalg.norm(side)
+    return np.stack([side, np.cross(back, side), back], axis=1)
+
+
+def _camera(writer: Writer, scene: Scene, aspect: float) -> int:
+    """The node of the camera, whose clipping planes hold the whole scene."""
+    camera = scene.camera
+    matrix = np.linalg.inv(camera.view())
+    size = float(np.linalg.norm(np.ptp(scene.bounds, axis=0)))
+    distance = float(np.linalg.norm(scene.bounds.mean(axis=0) - np.array(camera.eye)))
+    far = 2 * (distance + size) * _PER_MM
+    if isinstance(camera, OrthographicCamera):
+        half = camera.height / 2 * _PER_MM
+        lens = {"xmag": half * aspect, "ymag": half, "znear": 0.0, "zfar": far}
+        kind = "orthographic"
+    else:
+        lens = {"yfov": math.radians(camera.fov), "znear": far / 1e4, "zfar": far}
+        kind = "perspective"
+    number = writer.add("cameras", {"type": kind, kind: lens})
+    return writer.add("nodes", {"camera": number, **_placed(matrix)})
