@@ -73,7 +73,7 @@ class Document:
         """The number that an object gives of something of a kind; None where it gives none."""
         if not item.has(key):
             return None
-        self.at(kind, item.get(key), item.where)
+        self.at(kind, item.get(key), item.where or key)
         return as_whole(item.get(key))
 
     def buffer(self, index: Any, what: str) -> memoryview:

@@ -89,13 +89,11 @@ class _Skins:
         return Skin(nodes, inverse, joint, weight / weight.sum(axis=1, keepdims=True)), int(bare.sum())
 
     def _skin_of(self, one: Placed) -> int | None:
-        node, skins = self._stage.items[one.node], self._document.all("skin")
+        node = self._stage.items[one.node]
         if not node.has("skin"):
             return None
-        number = as_whole(node.get("skin"))
-        if number is None or not 0 <= number < len(skins):
-            raise InputError(f"{one.primitive.item.where}: there is no skin {number}")
-        return number
+        self._document.at("skin", node.get("skin"), one.primitive.item.where)
+        return int(node.get("skin"))
 
     def _bind(self, number: int) -> tuple[Array, Array]:
         """The nodes (J,) that the joints of a skin are, and their inverse bind matrices (J, 4, 4)."""

@@ -1,0 +1,172 @@
+"""The medium of a glTF material: coefficients of its extensions, and back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gltfs import File, png
+
+from wgsss.scene import MATERIALS
+from wgsss.scene.files.contents import Contents, Medium
+from wgsss.scene.files.gltf import read_gltf
+from wgsss.scene.files.gltf_fields import Item
+from wgsss.scene.files.gltf_media import read_medium, written
+from wgsss.scene.files.gltf_notes import Notes
+
+VOLUME, SCATTER, OLD = "KHR_materials_volume", "KHR_materials_scatter", "KHR_materials_volume_scatter"
+DIFFUSE = "KHR_materials_diffuse_transmission"
+WAX = {"attenuationDistance": 0.01, "attenuationColor": [0.9, 0.5, 0.3], "thicknessFactor": 0.1}
+COLOR = [0.9, 0.6, 0.4]
+
+
+def medium(extensions: dict[str, Any], notes: Notes | None = None) -> Medium | None:
+    return read_medium(Item({"extensions": extensions}, "material 0"), notes or Notes())
+
+
+def read(path: Path, file: File | None = None, **extensions: Any) -> Contents:
+    file = (file or File()).shown(
+        pbrMetallicRoughness={"baseColorFactor": [0.2, 0.4, 0.8, 1]},
+        extensions={VOLUME: WAX, OLD: {"multiscatterColor": COLOR}, **extensions},
+    )
+    return read_gltf(file.save(path / "wax.glb"))
+
+
+def test_by_the_formula_of_kulla_and_conty() -> None:
+    found = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
+    assert found is not None
+    for channel in range(3):
+        r, sigma_t = COLOR[channel], -math.log(WAX["attenuationColor"][channel]) / 0.01  # type: ignore[index]
+        albedo = 1 - (4.09712 + 4.20863 * r - math.sqrt(9.59217 + 41.6808 * r + 17.7126 * r * r)) ** 2
+        assert found.sigma_s_prime[channel] == pytest.approx(sigma_t * albedo)
+        assert found.sigma_a[channel] == pytest.approx(sigma_t * (1 - albedo))
+
+
+def test_all_spellings_of_the_drafts_say_the_same() -> None:
+    expected = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
+    for extension in (
+        {OLD: {"multiscatterColorFactor": COLOR}},
+        {SCATTER: {"multiscatterColorFactor": COLOR, "scatterStrengthFactor": 1}},
+        {SCATTER: {"multiscatterColor": COLOR, "scatterFactor": 1}},
+        {SCATTER: {"multiscatterColorFactor": COLOR, "scatterStrengthFactor": 1}, OLD: {}},
+    ):
+        assert medium({VOLUME: WAX, **extension}) == expected
+    half = medium({VOLUME: WAX, SCATTER: {"multiscatterColorFactor": COLOR, "scatterStrengthFactor": 0.5}})
+    assert half == medium({VOLUME: WAX, OLD: {"multiscatterColor": [value / 2 for value in COLOR]}})
+    white = medium({VOLUME: WAX, SCATTER: {"scatterStrengthFactor": 1}})
+    assert white is not None and white.sigma_a == (0, 0, 0)
+
+
+def test_anisotropy_lessens_scattering_and_keeps_the_colour() -> None:
+    """The reduced albedo, sigma_s' / (sigma_s' + sigma_a), is what decides the colour after many events."""
+    plain = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
+    forward = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR, "scatterAnisotropy": 0.8}})
+    assert plain is not None and forward is not None
+    for one in (plain, forward):
+        share = np.array(one.sigma_s_prime) / (np.array(one.sigma_s_prime) + one.sigma_a)
+        s = (
+            4.09712
+            + 4.20863 * np.array(COLOR)
+            - np.sqrt(9.59217 + 41.6808 * np.array(COLOR) + 17.7126 * np.square(COLOR))
+        )
+        assert share == pytest.approx(1 - s**2)
+    assert all(a < b for a, b in zip(forward.sigma_s_prime, plain.sigma_s_prime, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("extensions", "note"),
+    [
+        ({VOLUME: WAX}, f"{VOLUME} left out, for nothing scatters in it: used by 1 material"),
+        ({OLD: {}}, f"{OLD} left out, for it says nothing without {VOLUME}: used by 1 material"),
+        ({VOLUME: WAX, OLD: {}}, f"{OLD} left out, for nothing scatters in it: used by 1 material"),
+        ({VOLUME: WAX, SCATTER: {}}, f"{SCATTER} left out, for nothing scatters in it: used by 1 material"),
+        (
+            {VOLUME: {**WAX, "thicknessFactor": 0}, SCATTER: {"scatterStrengthFactor": 1}},
+            f"{SCATTER} left out, for its walls are thin (thicknessFactor 0): used by 1 material",
+        ),
+        *(
+            ({VOLUME: {**WAX, **change}, OLD: {"multiscatterColor": COLOR}}, f"{OLD} left out, for nothing scatters")
+            for change in ({"attenuationDistance": 0}, {"attenuationDistance": None}, {"attenuationColor": [1, 1, 1]})
+        ),
+    ],
+)
+def test_where_nothing_scatters_there_is_no_medium_and_a_note(extensions: dict[str, Any], note: str) -> None:
+    notes = Notes()
+    assert medium(extensions, notes) is None
+    assert len(notes.lines()) == 1 and notes.lines()[0].startswith(note)
+
+
+@pytest.mark.parametrize("distance", [1e-320, 1e-9, 1.0, 1e300])
+@pytest.mark.parametrize("color", [[0, 0, 0], [0, 0.5, 1], [1e-300, 1 - 1e-16, 0.5]])
+@pytest.mark.parametrize("scatter", [[0, 0, 1], [1e-300, 1, 0.5], [2, -1, 1]])
+@pytest.mark.parametrize("g", [-1, 0, 1, 7])
+def test_no_values_give_numbers_that_are_not_finite(distance: float, color: Any, scatter: Any, g: float) -> None:
+    volume = {"attenuationDistance": distance, "attenuationColor": color}
+    found = medium({VOLUME: volume, OLD: {"multiscatterColor": scatter, "scatterAnisotropy": g}})
+    assert found is not None
+    assert all(0 <= value <= 1e9 for value in found.sigma_a) and all(
+        1e-3 <= value <= 1e9 for value in found.sigma_s_prime
+    )
+
+
+def test_textures_of_a_medium_are_noted() -> None:
+    notes = Notes()
+    scatter = {"multiscatterColor": COLOR, "multiscatterColorTexture": {"index": 0}}
+    assert medium({VOLUME: WAX, OLD: scatter}, notes) is not None
+    assert notes.lines() == (f"multiscatterColorTexture of {OLD} left out: used by 1 material",)
+
+
+@pytest.mark.parametrize("name", [name for name, material in MATERIALS.items() if material.sigma_a is not None])
+def test_what_is_written_is_read_again(name: str) -> None:
+    material = MATERIALS[name]
+    sigma_a, sigma_s = np.array(material.sigma_a) * 1000, np.array(material.sigma_s_prime) * 1000
+    volume, scatter = written(sigma_a, sigma_s)
+    found = medium({VOLUME: volume, OLD: scatter})
+    assert found is not None
+    assert found.sigma_a == pytest.approx(sigma_a, rel=1e-9)
+    assert found.sigma_s_prime == pytest.approx(sigma_s, rel=1e-9)
+
+
+# --- the boundary ----------------------------------------------------------------------------------------------------
+
+
+def test_a_medium_makes_the_eta_of_gltf_count(tmp_path: Path) -> None:
+    assert read(tmp_path).parts[0].look.eta == 1.5
+    assert read(tmp_path, KHR_materials_ior={"ior": 1.4}).parts[0].look.eta == 1.4
+
+
+@pytest.mark.parametrize(
+    ("diffuse", "color"),
+    [
+        (None, (0.2, 0.4, 0.8)),
+        ({}, (0.2, 0.4, 0.8)),
+        ({"diffuseTransmissionFactor": 1}, (1, 1, 1)),
+        ({"diffuseTransmissionFactor": 1, "diffuseTransmissionColorFactor": [1, 0.5, 0]}, (1, 0.5, 0)),
+        ({"diffuseTransmissionFactor": 0.25}, (0.4, 0.55, 0.85)),
+    ],
+)
+def test_what_diffuse_transmission_lets_through_colours_the_surface(
+    tmp_path: Path, diffuse: dict[str, Any] | None, color: tuple[float, ...]
+) -> None:
+    contents = read(tmp_path, **({} if diffuse is None else {DIFFUSE: diffuse}))
+    assert contents.parts[0].look.base_color == pytest.approx(color) and contents.notes == ()
+
+
+@pytest.mark.parametrize(("share", "name"), [(1.0, "image 0"), (0.7, "image 0"), (0.3, None)])
+def test_of_two_maps_that_of_the_larger_share_is_taken(tmp_path: Path, share: float, name: str | None) -> None:
+    file = File()
+    file.add("textures", source=file.add("images", bufferView=file.view(png())))
+    diffuse = {"diffuseTransmissionFactor": share, "diffuseTransmissionColorTexture": {"index": 0}}
+    contents = read(tmp_path, file, **{DIFFUSE: diffuse})
+    found = contents.parts[0].look.base_color_map
+    assert (found and found.name) == name
+    expected = () if share == 1 else (f"diffuseTransmissionFactor of {DIFFUSE} taken as {round(share)}: in 1 material",)
+    assert contents.notes == expected
+
+
+def test_diffuse_transmission_without_a_medium_is_noted(tmp_path: Path) -> None:
+    file = File().shown(extensions={DIFFUSE: {"diffuseTransmissionFactor": 1}})
+    assert read_gltf(file.save(tmp_path / "leaf.glb")).notes == (f"{DIFFUSE} left out: used by 1 material",)
