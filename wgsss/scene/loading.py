@@ -106,8 +106,8 @@ def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: boo
 
 
 def _left_out(path: Path, count: int, what: str, option: str) -> None:
-    verb = "is" if count == 1 else "are"
-    warnings.warn(f"{path.name}: {counted(count, what)} of the file {verb} not used ({option} uses them)", stacklevel=2)
+    not_used = "is not used ({} uses it)" if count == 1 else "are not used ({} uses them)"
+    warnings.warn(f"{path.name}: {counted(count, what)} of the file {not_used.format(option)}", stacklevel=2)
 
 
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:
