@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene.files.gltf_fields import Item
+from wgsss.scene.files.gltf_fields import Item, plain
 
 if TYPE_CHECKING:
     from wgsss.scene.files.gltf_document import Document
@@ -35,6 +35,13 @@ def missing(extension: str) -> str:
     if package is None or importlib.util.find_spec(package) is not None:
         return ""
     return f"to read {extension}, the package {package} is needed (pip install {package})"
+
+
+def _loaded(package: str, packed: Item) -> Any:
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise packed.error(f"the package {package} cannot be loaded ({plain(str(error))})") from None
 
 
 def decoded_view(document: Document, view: Item) -> memoryview | None:
@@ -68,8 +75,9 @@ def _unpack(document: Document, view: Item, packed: Item) -> memoryview:
         raise packed.error(f"its {count} rows of {stride} bytes are not the {length} bytes of {view.where}")
     if length > _MESHOPT_GROWTH * (len(data) + 1):
         raise packed.error(f"{len(data)} bytes cannot hold its {count} rows")
+    package = _loaded("meshopt", packed)
     try:
-        found: Array = importlib.import_module("meshopt").decode_gltf_buffer(bytes(data), count, stride, mode, kind)
+        found: Array = package.decode_gltf_buffer(bytes(data), count, stride, mode, kind)
     except (ValueError, TypeError, RuntimeError):
         raise packed.error("damaged: it cannot be decoded") from None
     return memoryview(np.ascontiguousarray(found).tobytes())
@@ -89,8 +97,9 @@ def decoded_primitive(document: Document, primitive: Item) -> tuple[dict[str, Ar
         raise primitive.error(missing(DRACO))
     data, _ = document.view(packed.get("bufferView"), packed.where)
     names = packed.item("attributes") or Item({}, packed.where)
+    package = _loaded("DracoPy", packed)
     try:
-        mesh = importlib.import_module("DracoPy").decode(bytes(data))
+        mesh = package.decode(bytes(data))
         stored = {attribute["unique_id"]: np.asarray(attribute["data"]) for attribute in mesh.attributes}
         faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
     except Exception:  # its own exceptions, and an AttributeError for a cloud of points
