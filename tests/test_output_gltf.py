@@ -70,15 +70,16 @@ def test_a_mesh_comes_back_where_it_was(tmp_path: Path) -> None:
     assert contents.notes == ()
 
 
-def test_seams_and_hard_edges_come_back(tmp_path: Path) -> None:
+def test_seams_hard_edges_and_vertex_colours_come_back(tmp_path: Path) -> None:
     normals = Mesh(POSITIONS, FACES).face_normals
     normals = np.repeat(normals[:, None] / np.linalg.norm(normals, axis=1)[:, None, None], 3, axis=1)
-    mesh = Mesh(POSITIONS, FACES, normals, UVS)
+    mesh = Mesh(POSITIONS, FACES, normals, UVS, corner_colors=1 - UVS[..., [0, 0, 1]])
     contents = again(scene(mesh=mesh), tmp_path)
     (part,) = contents.parts
     assert placed(contents) == pytest.approx(scene(mesh=mesh).objects[0].placed[FACES], rel=1e-6)
     assert part.uvs[0][part.faces] == pytest.approx(UVS)
     assert part.normals is not None and part.normals[part.faces] == pytest.approx(normals, abs=1e-6)
+    assert part.colors is not None and part.colors[part.faces] == pytest.approx(1 - UVS[..., [0, 0, 1]])
 
 
 @pytest.mark.parametrize("name", [name for name, material in MATERIALS.items() if material.sigma_a is not None])
@@ -94,12 +95,14 @@ def test_a_medium_comes_back(tmp_path: Path, name: str) -> None:
 
 def test_textures_come_back(tmp_path: Path) -> None:
     color = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    maps = Maps(color, 255 - color, color[..., 0] * 10)
+    maps = Maps(color, 255 - color, color[..., 0] * 10, ("clamp", "mirror"), nearest=True, normal_scale=0.5)
     given = scene(mesh=Mesh(POSITIONS, FACES, corner_uvs=UVS), material=replace(MATERIALS["skin1"], maps=maps))
     contents = again(given, tmp_path)
     look = contents.parts[0].look
     assert np.array_equal(pixels(look.base_color_map), color)
-    assert np.array_equal(pixels(look.normal_map), 255 - color)
+    assert np.array_equal(pixels(look.normal_map), 255 - color) and look.normal_scale == 0.5
+    assert look.base_color_map is not None
+    assert (look.base_color_map.wrap, look.base_color_map.nearest) == (("clamp", "mirror"), True)
     assert look.specular_map is not None and look.specular_map.channels == "A"
     assert np.array_equal(pixels(look.specular_map)[..., 3], color[..., 0] * 10)
     assert contents.notes == ()
@@ -137,6 +140,12 @@ def test_a_material_without_coefficients_is_written_without_a_medium(tmp_path: P
     with pytest.warns(UserWarning, match="'skin' has no coefficients, and so no medium"):
         look = again(scene(material=MATERIALS["skin"]), tmp_path).parts[0].look
     assert look.medium is None and look.base_color == pytest.approx((0.63, 0.44, 0.34)) and look.eta == 1.4
+
+
+def test_a_mesh_that_has_no_size_now_is_left_out(tmp_path: Path) -> None:
+    gone = Object(Mesh(POSITIONS * 0, FACES, name="gone", shrunk=True), MATERIALS["marble"])
+    with pytest.warns(UserWarning, match="gone is left out, for it has no size now"):
+        assert len(again(scene(objects=(gone, *scene().objects)), tmp_path).parts) == 1
 
 
 def test_what_gltf_has_no_place_for_is_told(tmp_path: Path) -> None:

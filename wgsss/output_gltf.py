@@ -16,10 +16,12 @@ import numpy.typing as npt
 
 from wgsss import __version__
 from wgsss.output import check_output, replacing
-from wgsss.scene import DirectionalLight, Material, Mesh, OrthographicCamera, PointLight, Scene
+from wgsss.scene import DirectionalLight, Maps, Material, Mesh, OrthographicCamera, PointLight, Scene
 from wgsss.scene.files.gltf_media import VOLUME, VOLUME_SCATTER, written
+from wgsss.scene.files.gltf_textures import LINEAR, NEAREST, WRAPS
 from wgsss.scene.files.gltf_writer import Writer
 from wgsss.scene.light import Light
+from wgsss.scene.material import SLOTS
 
 Array = npt.NDArray[Any]
 
@@ -49,6 +51,9 @@ def glb(scene: Scene, aspect: float = 1.0) -> tuple[bytes, list[str]]:
     writer, notes = Writer(f"wgsss {__version__}"), dict[str, None]()
     nodes = []
     for thing in scene.objects:
+        if thing.mesh.shrunk:
+            notes[f"{thing.mesh.name} is left out, for it has no size now"] = None
+            continue
         material = writer.add("materials", _material(writer, thing.material, _depth(thing.mesh), notes))
         mesh = writer.add("meshes", {"name": thing.mesh.name, "primitives": [_primitive(writer, thing.mesh, material)]})
         nodes.append(writer.add("nodes", {"name": thing.mesh.name, "mesh": mesh, **_placed(thing.matrix)}))
@@ -76,7 +81,7 @@ def _primitive(writer: Writer, mesh: Mesh, material: int) -> dict[str, Any]:
     """The triangles of a mesh, its vertices split where corners have normals or texture coordinates of their own."""
     vertex = mesh.faces.ravel()
     apart = [vertex.astype(np.uint64)]
-    for values in (mesh.corner_uvs, mesh.corner_normals):
+    for values in (mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors):
         if values is not None:
             apart += list(np.ascontiguousarray(values + np.float32(0)).view(np.uint32).reshape(len(vertex), -1).T)
     first, indices = _distinct(apart)
@@ -87,6 +92,8 @@ def _primitive(writer: Writer, mesh: Mesh, material: int) -> dict[str, Any]:
     }
     if mesh.corner_uvs is not None:
         attributes["TEXCOORD_0"] = writer.rows(mesh.corner_uvs.reshape(-1, 2)[first])
+    if mesh.corner_colors is not None:
+        attributes["COLOR_0"] = writer.rows(mesh.corner_colors.reshape(-1, 3)[first])
     faces = writer.rows(indices.reshape(-1, 1).astype(np.uint32))
     return {"attributes": attributes, "indices": faces, "material": material}
 
@@ -102,16 +109,13 @@ def _distinct(columns: list[Array]) -> tuple[Array, Array]:
 
 
 def _material(writer: Writer, material: Material, depth: float, notes: dict[str, None]) -> dict[str, Any]:
-    maps = material.maps
-    color = {} if maps.base_color is None else {"Texture": writer.texture(maps.base_color)}
+    textures = _textures(writer, material.maps)
+    color = {"Texture": textures["base_color"]} if "base_color" in textures else {}
     factor = list(material.base_color)
     extensions = writer.extended("KHR_materials_ior", {"ior": material.eta})
-    if material.specular != 1 or maps.specular is not None:
-        specular: dict[str, Any] = {"specularFactor": material.specular}
-        if maps.specular is not None:
-            white = np.full((*maps.specular.shape, 3), 255, np.uint8)
-            specular["specularTexture"] = writer.texture(np.dstack([white, maps.specular]))
-        extensions |= writer.extended("KHR_materials_specular", specular)
+    if material.specular != 1 or "specular" in textures:
+        map_ = {"specularTexture": textures["specular"]} if "specular" in textures else {}
+        extensions |= writer.extended("KHR_materials_specular", {"specularFactor": material.specular, **map_})
     if material.sigma_a is None or material.sigma_s_prime is None:
         notes[f"'{material.name}' has no coefficients, and so no medium"] = None
     else:
@@ -125,9 +129,21 @@ def _material(writer: Writer, material: Material, depth: float, notes: dict[str,
         notes["color_after and transport are left out"] = None
     pbr = {"metallicFactor": 0.0, "roughnessFactor": material.roughness, **_named("baseColor", [*factor, 1.0], color)}
     found = {"name": material.name, "pbrMetallicRoughness": pbr, "extensions": extensions}
-    if maps.normal is not None:
-        found["normalTexture"] = writer.texture(maps.normal)
+    if "normal" in textures:
+        found["normalTexture"] = {**textures["normal"], "scale": material.maps.normal_scale}
     return found
+
+
+def _textures(writer: Writer, maps: Maps) -> dict[str, dict[str, Any]]:
+    """The textures that a material has, by their slots. The specular one is the alpha of a white image."""
+    images = {slot: getattr(maps, slot) for slot in SLOTS if getattr(maps, slot) is not None}
+    if not images:
+        return {}
+    if "specular" in images:
+        images["specular"] = np.dstack([np.full((*images["specular"].shape, 3), 255, np.uint8), images["specular"]])
+    codes = {key: WRAPS[wrap] for key, wrap in zip(("wrapS", "wrapT"), maps.wrap, strict=True)}
+    sampler = writer.add("samplers", {**codes, "magFilter": NEAREST if maps.nearest else LINEAR})
+    return {slot: writer.texture(image, sampler) for slot, image in images.items()}
 
 
 def _named(name: str, factor: list[float], texture: dict[str, Any]) -> dict[str, Any]:

@@ -16,7 +16,6 @@ import trimesh
 
 from wgsss.errors import InputError
 from wgsss.scene import LoadedMesh, load_mesh, load_scene
-from wgsss.scene.gltf import read_document
 from wgsss.scene.keyframes import Channel
 
 Array = np.ndarray[Any, Any]
@@ -479,17 +478,6 @@ def test_buffers_beside_or_inside_the_text(tmp_path: Path, inside: bool) -> None
     data = base64.b64encode(bytes(file.data)).decode()
     path = file.save(tmp_path / "arm.gltf", uri=f"data:application/gltf-buffer;base64,{data}" if inside else None)
     assert np.array_equal(at(load_mesh(path, mm_per_unit=1), 1), expected)
-
-
-def test_interleaved_and_normalised_numbers(tmp_path: Path) -> None:
-    file = File()
-    view = file.view([(1, 2, -3, 99), (-128, 127, 0, 99)], "i1")
-    file.tree.bufferViews[view].byteStride = 4
-    accessor = g.Accessor(bufferView=view, byteOffset=1, componentType=g.BYTE, type="VEC2", count=2)
-    file.tree.accessors += [accessor, g.Accessor(**{**vars(accessor), "byteOffset": 0, "normalized": True})]
-    document = read_document(file.save(tmp_path / "numbers.glb"))
-    assert document.numbers(0, "VEC2", "it").tolist() == [[2, -3], [127, 0]]
-    assert document.numbers(1, "VEC2", "it") == pytest.approx(np.array([(1 / 127, 2 / 127), (-1, 1)]))
 
 
 # --- bad input -------------------------------------------------------------------------------------------------------

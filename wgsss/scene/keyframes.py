@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
-from wgsss.scene.gltf import Document
 from wgsss.scene.rig import Pose
 
 Array = npt.NDArray[Any]
@@ -75,31 +73,3 @@ def _slerp(start: Array, end: Array, t: float) -> Array:
     angle = math.acos(cosine)
     turned: Array = (math.sin((1 - t) * angle) * start + math.sin(t * angle) * end) / math.sin(angle)
     return turned
-
-
-def read_channels(document: Document, animation: Any, rest: Pose, where: str) -> list[Channel]:
-    """The channels of an animation, a pygltflib one; those of extensions left out. Raises InputError for bad ones."""
-    found = []
-    for number, channel in enumerate(animation.channels):
-        node, path, what = channel.target.node, channel.target.path, f"{where}, channel {number}"
-        if node is None or path not in PATHS:
-            continue
-        if not 0 <= node < len(rest.weights):
-            raise InputError(f"{what}: there is no node {node}")
-        if not 0 <= channel.sampler < len(animation.samplers):
-            raise InputError(f"{what}: there is no sampler {channel.sampler}")
-        sampler = animation.samplers[channel.sampler]
-        kind = sampler.interpolation or "LINEAR"
-        if kind not in INTERPOLATIONS:
-            raise InputError(f"{what}: interpolation must be one of {', '.join(INTERPOLATIONS)}, not {kind}")
-        times = document.numbers(sampler.input, "SCALAR", f"{what}: times")[:, 0].astype(np.float64)
-        if not len(times) or times[0] < 0 or (np.diff(times) < 0).any():
-            raise InputError(f"{what}: its times must rise, from 0 or later")
-        size = len(rest.weights[node]) if path == "weights" else getattr(rest, path).shape[1]
-        rows = len(times) * INTERPOLATIONS[kind] * (size if path == "weights" else 1)
-        values = document.numbers(sampler.output, PATHS[path], f"{what}: {path}", rows).astype(np.float64)
-        values = values.reshape(len(times), INTERPOLATIONS[kind], size)
-        if path == "rotation" and not values[:, INTERPOLATIONS[kind] // 2].any(axis=1).all():
-            raise InputError(f"{what}: a rotation is zero")
-        found.append(Channel(node, path, kind, times, values))
-    return found

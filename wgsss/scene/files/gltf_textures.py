@@ -17,8 +17,9 @@ TRANSFORM = "KHR_texture_transform"
 IMAGES = ("EXT_texture_webp", "EXT_texture_avif")
 """extensions that put an image in a format of their own in place of a texture's source"""
 
-_WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
-_NEAREST, _LINEAR = 9728, 9729
+WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
+NEAREST, LINEAR = 9728, 9729
+"""the codes of samplers"""
 
 
 class Textures:
@@ -89,11 +90,16 @@ class Textures:
     def _sampling(self, texture: Item) -> tuple[tuple[str, str], bool]:
         number = self._document.link(texture, "sampler", "sampler")
         sampler = Item({}) if number is None else self._document.all("sampler")[number]
-        codes = [sampler.whole(key, 10497) for key in ("wrapS", "wrapT")]
-        for key, code in zip(("wrapS", "wrapT"), codes, strict=True):
-            if code not in _WRAPS:
-                raise sampler.error(f"there is no {key} {code}")
-        return (_WRAPS[codes[0]], _WRAPS[codes[1]]), sampler.whole("magFilter", _LINEAR) == _NEAREST
+        wrap = (_wrap(sampler, "wrapS"), _wrap(sampler, "wrapT"))
+        return wrap, sampler.whole("magFilter", LINEAR) == NEAREST
+
+
+def _wrap(sampler: Item, key: str) -> str:
+    code = sampler.whole(key, WRAPS["repeat"])
+    for name, known in WRAPS.items():
+        if code == known:
+            return name
+    raise sampler.error(f"there is no {key} {code}")
 
 
 def _rows(transform: Item | None) -> tuple[Triple, Triple] | None:

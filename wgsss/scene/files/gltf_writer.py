@@ -51,14 +51,14 @@ class Writer:
             accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
         return self.add("accessors", accessor)
 
-    def texture(self, pixels: Array) -> dict[str, Any]:
+    def texture(self, pixels: Array, sampler: int) -> dict[str, Any]:
         """A texture of uint8 (H, W, 3 or 4), as a material refers to it."""
         from PIL import Image
 
         file = io.BytesIO()
         Image.fromarray(np.ascontiguousarray(pixels)).save(file, format="png")
         image = self.add("images", {"bufferView": self._view(file.getvalue()), "mimeType": "image/png"})
-        return {"index": self.add("textures", {"source": image})}
+        return {"index": self.add("textures", {"source": image, "sampler": sampler})}
 
     def glb(self, nodes: list[int]) -> bytes:
         """The file, its scene being these nodes."""
