@@ -230,7 +230,7 @@ def test_hidden_nodes_and_what_is_below_them(tmp_path: Path) -> None:
     file.tree["nodes"][2] |= {"children": [3], "extensions": {"KHR_node_visibility": {"visible": True}}}
     contents = read(file, tmp_path)
     assert [part.name for part in contents.parts] == ["mesh 0, primitive 0"]
-    assert contents.notes == ("hidden by KHR_node_visibility, and left out: 3 nodes",)
+    assert contents.notes == ("left out, for KHR_node_visibility hides them: 3 nodes",)
 
 
 def test_a_chain_of_ten_thousand_nodes(tmp_path: Path) -> None:

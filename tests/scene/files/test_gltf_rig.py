@@ -97,7 +97,7 @@ def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_pa
     contents = read(file, tmp_path)
     expected = [(1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
     assert posed(contents, "Bend", 1) == pytest.approx(np.array(expected), abs=1e-6)
-    assert contents.notes == ("carried by the skin's first joint, for they have no joint weights: 3 vertices",)
+    assert contents.notes == ("without joint weights, and carried by the skin's first joint: 3 vertices",)
 
 
 def test_a_second_set_of_joints(tmp_path: Path) -> None:
@@ -243,10 +243,10 @@ def test_channels_that_move_nothing_here_are_counted(tmp_path: Path) -> None:
         file.tree["animations"][1]["channels"].append({"sampler": 0, "target": target})
     contents = read(file, tmp_path)
     assert contents.notes == (
-        "of KHR_animation_pointer, and left out: 2 animation channels",
-        "without a node, and left out: 1 animation channel",
-        "of an unknown path (visibility), and left out: 1 animation channel",
-        "of the morph targets of a node that has none, and left out: 1 animation channel",
+        "animation left out, of KHR_animation_pointer: 2 channels",
+        "animation left out, without a node: 1 channel",
+        "animation left out, of an unknown path (visibility): 1 channel",
+        "animation left out, of the morph targets of a node that has none: 1 channel",
     )
     assert [channel.path for channel in contents.animations["More"]()] == ["translation"]
 

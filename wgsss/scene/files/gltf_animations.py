@@ -35,7 +35,7 @@ def read_animations(
         for channel in animation.items("channels", "channel"):
             reason = _left_out(channel, rest)
             if reason:
-                notes.add(f"{reason}, and left out:", "animation channel")
+                notes.add(f"animation left out, {reason}:", "channel")
         found.setdefault(name, partial(_read, path, document, animation, rest, f"animation {plain(name)}"))
     return found
 

@@ -41,6 +41,7 @@ def read_medium(material: Item, notes: Notes) -> Medium | None:
         if scatter.has(key):
             notes.add(f"{key} of {name} left out: used by", "material")
     color = _scatter_color(scatter, successor=name == SCATTER)
+    # The older draft leaves thicknessFactor out of its examples: only by its successor are walls thin by default.
     if name == SCATTER and volume.number("thicknessFactor", 0.0, low=0) == 0:
         notes.add(f"{name} left out, for its walls are thin (thicknessFactor 0): used by", "material")
         return None

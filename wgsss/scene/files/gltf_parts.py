@@ -65,7 +65,7 @@ def read_parts(document: Document, stage: Stage, notes: Notes) -> list[Placed]:
                 found.append(Placed(node, mesh, primitive, instance, _part(primitive, look, matrix)))
     hidden = sum(stage.items[node].has("mesh") for node in stage.hidden)
     if hidden:
-        notes.add("hidden by KHR_node_visibility, and left out:", "node", hidden)
+        notes.add("left out, for KHR_node_visibility hides them:", "node", hidden)
     if not found:
         raise InputError("the mesh is empty: it has no faces" + "".join(f"; {line}" for line in notes.lines()))
     return found

@@ -47,7 +47,7 @@ def read_rig(document: Document, stage: Stage, placed: Sequence[Placed], notes: 
         parts.append(Part(one.node, primitive.positions, targets[key], skin, one.instance))
         bare += alone
     if bare:
-        notes.add("carried by the skin's first joint, for they have no joint weights:", "vertex", bare)
+        notes.add("without joint weights, and carried by the skin's first joint:", "vertex", bare)
     return Rig(stage.nodes, tuple(parts))
 
 

@@ -45,12 +45,12 @@ def _light(light: Item, world: Array, notes: Notes) -> LightSource | None:
     color = light.numbers("color", 3, (1.0, 1.0, 1.0))
     power = np.maximum(color, 0) * light.number("intensity", 1.0, low=0)
     if kind == "spot":
-        notes.add("taken for point lights, without their cones:", "spot light")
+        notes.add("taken for point lights, their cones left out:", "spot light")
     if light.has("range"):
-        notes.add("light also beyond their range:", "light")
+        notes.add("range left out: of", "light")
     direction = _unit(-world[:3, 2])
     if direction is None and kind == "directional":
-        notes.add("without a direction, and left out:", "light")
+        notes.add("left out, for it has no direction:", "light")
         return None
     name = f"{light.where} ({light.name})" if light.name else light.where
     kind = "directional" if kind == "directional" else "point"
@@ -80,7 +80,7 @@ def _camera(camera: Item, world: Array, notes: Notes) -> CameraView | None:
     forward, up = _unit(-world[:3, 2]), _unit(world[:3, 1])
     flat = forward is None or up is None or not np.linalg.norm(np.cross(forward, up)) > 1e-6
     if flat or height == 0 or (fov is not None and not 0 < fov < 180):
-        notes.add("see nothing, and left out:", "camera")
+        notes.add("left out, for they see nothing:", "camera")
         return None
     name = f"{camera.where} ({camera.name})" if camera.name else camera.where
     return CameraView(name, _triple(world[:3, 3]), _triple(forward), _triple(up), fov, height)
