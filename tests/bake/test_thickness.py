@@ -13,10 +13,9 @@ import pytest
 from scenes import plane
 from scipy.integrate import quad_vec
 from scipy.stats import spearmanr
-from trimesh import Trimesh
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from wgsss.bake import thickness
+from wgsss.bake.rays import Caster
 from wgsss.bake.thickness import falloff, far_side, local_thickness, smoothed, table
 from wgsss.optics import Profile, SumOfGaussians
 from wgsss.scene import MATERIALS, Mesh, load_mesh
@@ -135,8 +134,7 @@ def test_thickness_and_chord_length(name: str, median: float, lowest: float, dat
 
 def at(mesh: Mesh, vertices: Any) -> Any:
     """The local thickness (N, 3) of marble at some vertices of a mesh, not smoothed."""
-    triangles = Trimesh(mesh.positions.astype(np.float64), mesh.faces, process=False, validate=False)
-    lengths = far_side(RayMeshIntersector(triangles), mesh, vertices)
+    lengths = far_side(Caster(mesh.positions, mesh.faces), mesh, vertices)
     return (falloff(MARBLE, np.minimum(lengths, 1e6)) * np.isfinite(lengths)[..., None]).mean(axis=1)
 
 
@@ -154,10 +152,10 @@ def chords(name: str, data: Path) -> tuple[Mesh, Any, Any, Any]:
     w = w / np.linalg.norm(w, axis=2, keepdims=True) - n[:, None]  # on a ball that touches the surface: the cosine's
     w = (w / np.linalg.norm(w, axis=2, keepdims=True)).reshape(-1, 3)
     start = np.repeat(mesh.positions[vertices] - 1e-3 * n, 300, axis=0)
-    triangles = Trimesh(mesh.positions.astype(np.float64), mesh.faces, process=False, validate=False)
-    end, ray, face = RayMeshIntersector(triangles).intersects_location(start, w, multiple_hits=False)
-    d, normals = np.full(len(start), np.inf), np.zeros((len(start), 3))
-    d[ray], normals[ray] = np.linalg.norm(end - start[ray], axis=1), mesh.face_normals[face]
+    face = Caster(mesh.positions, mesh.faces).first(start, w)
+    normals = np.where(face[:, None] < 0, 0.0, mesh.face_normals[face])
+    height = np.einsum("nk,nk->n", normals, mesh.positions[mesh.faces[face, 0]] - start)
+    d = np.divide(height, np.einsum("nk,nk->n", normals, w), out=np.full(len(w), np.inf), where=face >= 0)
     return mesh, vertices, d.reshape(-1, 300), normals.reshape(-1, 300, 3)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake import rays
 from wgsss.bake.cache import cached
 from wgsss.bake.environment import summed
 from wgsss.scene import EnvironmentLight, Scene
@@ -30,10 +31,7 @@ def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: 
     pixels = summed(lights)
 
     def make() -> dict[str, Array]:
-        from trimesh import Trimesh
-        from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-        caster = RayMeshIntersector(Trimesh(vertices, faces, process=False, validate=False))
+        caster = rays.Caster(vertices, faces)
         lift = _LIFT * float(np.ptp(vertices, axis=0).max())
         blocks = range(0, len(positions), _BLOCK)
         parts = [
@@ -42,7 +40,7 @@ def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: 
         return {"visible": np.concatenate(parts)}
 
     key = [vertices, faces, pixels, positions, normals]
-    return cached("sky", key, make, label="casting rays at the sky")["visible"]
+    return cached("sky", key, make, code=[rays.Caster], label="casting rays at the sky")["visible"]
 
 
 def _triangles(scene: Scene) -> tuple[Array, Array]:
@@ -55,11 +53,11 @@ def _triangles(scene: Scene) -> tuple[Array, Array]:
     return np.concatenate(vertices).astype(np.float64), np.concatenate(faces)
 
 
-def _visible(caster: Any, pixels: Array, x: Array, n: Array, lift: float, first: int) -> Array:
+def _visible(caster: rays.Caster, pixels: Array, x: Array, n: Array, lift: float, first: int) -> Array:
     """The share (N,) at points of which the first has the number `first`, which turns its directions."""
     w = _about(n.astype(np.float64), _golden(np.arange(first, first + len(x))))
     origins = np.repeat(x + lift * n, DIRECTIONS, axis=0)
-    free = ~caster.intersects_any(origins, w.reshape(-1, 3)).reshape(len(x), DIRECTIONS)
+    free = ~caster.blocked(origins, w.reshape(-1, 3)).reshape(len(x), DIRECTIONS)
     radiance = _seen(pixels, w)
     return ((free * radiance).sum(axis=1) / np.maximum(radiance.sum(axis=1), 1e-30)).astype(np.float32)
 

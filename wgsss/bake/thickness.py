@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake import rays
 from wgsss.bake.cache import cached
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
@@ -46,12 +47,7 @@ def local_thickness(mesh: Mesh, profile: Profile) -> Array:
     distances, falls = table(profile)
 
     def make() -> dict[str, Array]:
-        from trimesh import Trimesh
-        from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-        caster = RayMeshIntersector(
-            Trimesh(mesh.positions.astype(np.float64), mesh.faces, process=False, validate=False)
-        )
+        caster = rays.Caster(mesh.positions, mesh.faces)
         found = np.zeros((len(mesh.positions), 3), np.float32)
         for first in range(0, len(found), _BLOCK):
             block = np.arange(first, min(first + _BLOCK, len(found)))
@@ -63,7 +59,7 @@ def local_thickness(mesh: Mesh, profile: Profile) -> Array:
 
     key = [mesh.positions, mesh.faces, distances, falls]
     label = f"measuring the thickness at {len(mesh.positions)} vertices"
-    return cached("thickness", key, make, code=[Mesh], label=label)["thickness"]
+    return cached("thickness", key, make, code=[Mesh, rays.Caster], label=label)["thickness"]
 
 
 def falloff(profile: Profile, d: Array) -> Array:
@@ -84,12 +80,12 @@ def table(profile: Profile) -> tuple[Array, Array]:
     return distances, falloff(profile, distances)
 
 
-def far_side(caster: Any, mesh: Mesh, vertices: Array) -> Array:
+def far_side(caster: rays.Caster, mesh: Mesh, vertices: Array) -> Array:
     """How far away, mm, what each ray (N, RAYS) from `vertices` (N,) meets is; inf where that is not the far side."""
     n = mesh.normals[vertices].astype(np.float64)
     w = _about(-n, _TURN * RAYS * vertices)
     x = mesh.positions[vertices] - _LIFT * float(np.ptp(mesh.bounds, axis=0).max()) * n
-    hit = caster.intersects_first(np.repeat(x, RAYS, axis=0), w.reshape(-1, 3)).reshape(len(x), RAYS)
+    hit = caster.first(np.repeat(x, RAYS, axis=0), w.reshape(-1, 3)).reshape(len(x), RAYS)
     normal, corner = mesh.face_normals[hit], mesh.positions[mesh.faces[hit, 0]]
     opposed = (hit >= 0) & (np.einsum("nrk,nk->nr", normal, n) < 0.0)
     height = np.einsum("nrk,nrk->nr", normal, corner - x[:, None])

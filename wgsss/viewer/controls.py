@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake.rays import Caster
 from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Object, OrthographicCamera, Scene
 from wgsss.scene.light import Light
 
@@ -100,18 +101,23 @@ def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
     start = start - towards * (
         float(np.ptp(scene.bounds, axis=0).max()) if isinstance(camera, OrthographicCamera) else 0
     )
-    hits = []
-    for thing in scene.objects:
-        hits += list(_caster(thing).intersects_location([start], [towards], multiple_hits=False)[0])
-    return min(hits, key=lambda hit: float((hit - start) @ towards), default=None)
+    distance = min(_distance(thing, start, towards) for thing in scene.objects)
+    return start + distance * towards if math.isfinite(distance) else None
+
+
+def _distance(thing: Object, start: Array, towards: Array) -> float:
+    """From `start` to an object in the direction of the unit vector `towards`; inf where it is missed."""
+    face = _caster(thing).first(start[None], towards[None])[0]
+    if face < 0:
+        return math.inf
+    a, b, c = thing.placed[thing.mesh.faces[face]].astype(np.float64)
+    normal = np.cross(b - a, c - a)
+    return float(normal @ (a - start) / (normal @ towards))
 
 
 @lru_cache(maxsize=32)
-def _caster(thing: Object) -> Any:
-    from trimesh import Trimesh
-    from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-    return RayMeshIntersector(Trimesh(thing.placed, thing.mesh.faces, process=False, validate=False))
+def _caster(thing: Object) -> Caster:
+    return Caster(thing.placed, thing.mesh.faces)
 
 
 def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from wgsss.bake.cache import Arrays, KeyPart, cached
+from wgsss.bake.rays import Caster
 from wgsss.bake.sam.blend import blend
 from wgsss.bake.sam.blocks import Blocks
 from wgsss.bake.sam.bounds import Bounds
@@ -52,7 +53,7 @@ _QUICK = (Entries, fan_areas, Fans, FormFactors, QuickFormFactors, Patches, send
 _CODE: dict[str, tuple[Any, ...]] = {
     "top": _TOP,
     "coarse": _TOP,
-    "fit": (*_QUICK, blend, mix, nonnegative, pursue, refit, training, "sam/blends", "sam/mix"),
+    "fit": (*_QUICK, blend, mix, nonnegative, pursue, refit, training, Caster, "sam/blends", "sam/mix"),
     "everything": (*_QUICK, select_fit),
 }
 """What each depends on, beside the module that it is in."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake import rays
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -25,17 +26,14 @@ _LIFT = 1e-4  # of the mesh's extent: how far above the surface rays start
 
 def training(mesh: Mesh) -> Array:
     """float32 (SUNS + SKIES + 1, V): irradiances at the vertices, each times the weight of its error."""
-    from trimesh import Trimesh
-    from trimesh.ray.ray_pyembree import RayMeshIntersector
-
     n = mesh.normals.astype(np.float64)
     x = mesh.positions + _LIFT * float(np.ptp(mesh.bounds, axis=0).max()) * n
-    caster = RayMeshIntersector(Trimesh(mesh.positions.astype(np.float64), mesh.faces, process=False, validate=False))
+    caster = rays.Caster(mesh.positions, mesh.faces)
     found = np.zeros((SUNS + SKIES + 1, len(n)), np.float32)
     for light, w in zip(found, spiral(SUNS), strict=False):
         cosine = n @ w
         lit = np.flatnonzero(cosine > 0.0)
-        free = ~caster.intersects_any(x[lit], np.broadcast_to(w, (len(lit), 3)))
+        free = ~caster.blocked(x[lit], np.broadcast_to(w, (len(lit), 3)))
         light[lit] = cosine[lit] * free
     found[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + spiral(SKIES) @ n.T)
     found[-1] = EVEN_WEIGHT
