@@ -1,4 +1,4 @@
-"""The one exception that users are meant to read."""
+"""The exceptions and the warning that users are meant to read."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ class InputError(ValueError):
 
 class RenderError(RuntimeError):
     """A fault of the renderer or the driver, not of the input: one line; commands print it and exit with 1."""
+
+
+class Note(UserWarning):
+    """One line that tells the user what was left out, repaired or taken otherwise than asked for."""
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
+import io
+import os
 import sys
 import threading
 import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from wgsss.bake.cache import cached
+from wgsss.errors import Note
 
 
 @pytest.fixture
@@ -79,18 +86,42 @@ def test_a_change_of_code_is_another_entry(folder: Path, tmp_path: Path, monkeyp
     assert len(list(folder.iterdir())) == 4
 
 
-@pytest.mark.parametrize("damage", ["a bit", "cut short", "empty", "other text"])
-def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage: str) -> None:
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "a bit": lambda data: data[: len(data) // 3] + bytes([data[len(data) // 3] ^ 1]) + data[len(data) // 3 + 1 :],
+    "cut short": lambda data: data[:-50],
+    "empty": lambda data: b"",
+    "other text": lambda data: b"hello",
+    "an array alone": lambda data: saved(np.save, np.zeros(3)),
+    "no keys": lambda data: saved(np.savez),
+    "other keys": lambda data: saved(np.savez, b=np.zeros(3)),
+    "objects": lambda data: saved(np.savez, a=np.array([None])),
+    "other shapes": lambda data: replaced(data, a=np.zeros((64, 2), np.float32)),
+    "other dtypes": lambda data: replaced(data, a=np.zeros((64, 3), np.float64)),
+    "more keys": lambda data: replaced(data, more=np.zeros(3)),
+}
+
+
+def saved(save: Any, *values: np.ndarray, **arrays: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    save(stream, *values, **arrays)
+    return stream.getvalue()
+
+
+def replaced(data: bytes, **arrays: np.ndarray) -> bytes:
+    """The entry with some of its arrays replaced."""
+    with np.load(io.BytesIO(data)) as entry:
+        return saved(np.savez, **{**entry, **arrays})
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_an_entry_that_is_damaged_or_of_other_content_is_made_anew_with_a_warning(folder: Path, damage: str) -> None:
     make = Maker(7.0)
     cached("thing", ["k"], make)
     (path,) = folder.iterdir()
-    data = bytearray(path.read_bytes())
-    if damage == "a bit":
-        data[len(data) // 3] ^= 1  # in the array's numbers: only a checksum can tell
-    path.write_bytes({"a bit": data, "cut short": data[:-50], "empty": b"", "other text": b"hello"}[damage])
-    with pytest.warns(UserWarning, match="damaged"):
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    with pytest.warns(Note, match="damaged, or of other content") as caught:
         result = cached("thing", ["k"], make)
-    assert make.calls == 2
+    assert make.calls == 2 and len(caught) == 1
     assert (result["a"] == 7.0).all()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -98,12 +129,66 @@ def test_damaged_entry_is_rebuilt_with_a_warning(folder: Path, damage: str) -> N
     assert make.calls == 2
 
 
+def test_the_entry_of_another_key_is_not_taken(folder: Path) -> None:
+    cached("thing", ["k"], Maker(1.0))
+    (path,) = folder.iterdir()
+    cached("thing", ["l"], Maker(2.0))
+    (other,) = set(folder.iterdir()) - {path}
+    other.write_bytes(path.read_bytes())
+    with pytest.warns(Note, match="of other content"):
+        assert (cached("thing", ["l"], Maker(2.0))["a"] == 2.0).all()
+
+
+@pytest.mark.parametrize("kind", ["folder", "fifo", "link to a device", "link to itself"])
+def test_what_is_in_the_place_of_an_entry_is_replaced_or_used_around(folder: Path, kind: str) -> None:
+    cached("thing", ["k"], Maker())
+    (path,) = folder.iterdir()
+    path.unlink()
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero" if kind == "link to a device" else path)
+    with pytest.warns(Note) as caught:
+        assert (cached("thing", ["k"], Maker(3.0))["a"] == 3.0).all()
+    assert all(path.name in str(note.message) for note in caught)
+    assert [file.name for file in folder.iterdir()] == [path.name]
+    assert path.is_dir() if kind == "folder" else path.is_file() and not path.is_symlink()
+
+
 def test_unwritable_folder_only_warns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path / "file" / "cache"))
-    with pytest.warns(UserWarning, match="cannot be written") as caught:
+    with pytest.warns(Note, match="cannot be written") as caught:
         assert (cached("thing", [], Maker())["a"] == 1).all()
     assert len(caught) == 1
+
+
+def test_a_full_disk_leaves_no_entry_and_the_result_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def write_some(file: Any, **arrays: np.ndarray) -> None:
+        file.write(b"PK")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(np, "savez", write_some)
+    with pytest.warns(Note, match="No space left"):
+        assert (cached("thing", [], Maker())["a"] == 1).all()
+    assert not list(folder.iterdir())
+
+
+def test_an_entry_is_made_with_one_blas_thread_also_after_another_that_it_needs(folder: Path) -> None:
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    before, seen = threads(), []
+
+    def make() -> dict[str, np.ndarray]:
+        cached("inner", [], Maker())
+        seen.append(threads())
+        return {"a": np.zeros(1)}
+
+    cached("outer", [], make)
+    assert (seen, threads()) == ([{1}], before)
 
 
 def test_what_fails_leaves_nothing(folder: Path) -> None:

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import wgsl
+from wgsss import saying, wgsl
+from wgsss.errors import Note
 
 Arrays = dict[str, npt.NDArray[Any]]
 KeyPart = bytes | str | int | float | npt.NDArray[Any] | None
+
+_CONTENTS = "wgsss contents"
+"""the member of an entry that says which one it is and what else it holds"""
 
 
 def folder() -> Path:
@@ -39,9 +45,12 @@ def cached(
 ) -> Arrays:
     """What `make()` gives, from the cache where an entry with this key is there.
 
-    An entry is an uncompressed .npz, whose members carry CRC-32 checksums. A damaged entry is rebuilt with a warning;
-    where the folder cannot be written, the result is used and a warning given. Entries are written to a temporary
-    file and moved into place, so that processes that bake the same entry at once do not disturb each other.
+    An entry is an uncompressed .npz, whose members carry CRC-32 checksums; one of them says which entry it is and what
+    else is in it. An entry that is damaged or another one is made anew with a warning; where the folder cannot be
+    written, the result is used and a warning given. Entries are written to a temporary file and moved into place, so
+    that processes that bake the same entry at once do not disturb each other.
+
+    `make` runs with one BLAS thread: with two, sums are rounded otherwise, and equal keys would stand for other bits.
 
     Args:
         kind: what the entry is, the head of its file name.
@@ -52,23 +61,55 @@ def cached(
         label: says what is being made, on a terminal, while `make` runs.
     """
     path = folder() / f"{kind}-{_digest(key, make, code)}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as entry:
-            return {name: entry[name] for name in entry.files}
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except Exception as error:  # a damaged file can fail in any way: bad zip, bad checksum, bad array header
-        warnings.warn(f"{path}: damaged cache entry ({error}), made anew", stacklevel=2)
-    arrays = _make(make, label)
+    found = _read(path)
+    if found is not None:
+        return found
+    from threadpoolctl import threadpool_limits
+
+    with saying.doing(label), threadpool_limits(1, "blas"):
+        arrays = {name: np.asarray(values) for name, values in make().items()}
     try:
         _write(path, arrays)
     except OSError as error:
-        warnings.warn(f"{path.parent}: the cache cannot be written ({error.strerror or error})", stacklevel=2)
+        warnings.warn(f"{path}: this cache entry cannot be written ({error.strerror or error})", Note, stacklevel=2)
     return arrays
 
 
+def entries() -> dict[Path, int]:
+    """The entries there are, and bytes of each."""
+    found = {}
+    with suppress(OSError):  # there is no folder yet, or it cannot be read
+        for path in folder().glob("*.npz"):
+            with suppress(OSError):  # another process has just replaced it
+                found[path] = path.stat().st_size
+    return found
+
+
+def _read(path: Path) -> Arrays | None:
+    """The arrays of an entry, or None where there is none. Warns of one that is of no use."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise ValueError
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as entry:
+            arrays = {name: entry[name] for name in entry.files}
+        if str(arrays.pop(_CONTENTS)) != _contents(path, arrays):
+            raise ValueError
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except Exception as error:  # a damaged file can fail in any way: bad zip, bad checksum, bad array header
+        why = getattr(error, "strerror", None) or "damaged, or of other content"
+        warnings.warn(f"{path}: this cache entry is of no use ({why}): made anew", Note, stacklevel=3)
+        return None
+    return arrays
+
+
+def _contents(path: Path, arrays: Arrays) -> str:
+    """Which entry it is, and what it holds."""
+    return "; ".join([path.stem, *sorted(f"{name} {a.dtype.str} {a.shape}" for name, a in arrays.items())])
+
+
 def _digest(key: Sequence[KeyPart], make: Callable[[], Arrays], code: Sequence[Any]) -> str:
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(_CONTENTS.encode())
 
     def add(tag: str, data: bytes) -> None:
         digest.update(f"{tag}:{len(data)}:".encode())
@@ -87,23 +128,12 @@ def _digest(key: Sequence[KeyPart], make: Callable[[], Arrays], code: Sequence[A
     return digest.hexdigest()[:32]
 
 
-def _make(make: Callable[[], Arrays], label: str) -> Arrays:
-    told = bool(label) and sys.stderr.isatty()
-    if told:
-        print(f"{label} …", end="", file=sys.stderr, flush=True)
-    try:
-        return make()
-    finally:
-        if told:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
-
-
 def _write(path: Path, arrays: Arrays) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".tmp", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
+            np.savez(file, **arrays, **{_CONTENTS: np.array(_contents(path, arrays))})  # type: ignore[arg-type]
         os.replace(temporary, path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

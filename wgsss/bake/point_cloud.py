@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.octree import Octree, morton, octree
 from wgsss.bake.samples import Samples, count, subdivided
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -48,6 +48,7 @@ def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
         warnings.warn(
             f"{mesh.name}: {wanted:.3g} samples {spacing:.2g} mm apart are too many: "
             f"{MOST} are used, {coarser:.2g} mm apart",
+            Note,
             stacklevel=2,
         )
         spacing = coarser

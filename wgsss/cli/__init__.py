@@ -5,37 +5,50 @@ Exit codes: 0 done, 1 a fault of the renderer, 2 bad input. Nothing heavy is imp
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
+import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from wgsss import __version__
+from wgsss import __version__, saying
 from wgsss.cli import bake, bench, catalogue, compare, export, info, profile, render, view
 from wgsss.cli.arguments import Parser
-from wgsss.errors import InputError, RenderError, unknown
+from wgsss.cli.signals import Stopped, stoppable
+from wgsss.errors import InputError, Note, RenderError, unknown
+from wgsss.text import one_line
 
-INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as shells report them
+PIPE_CLOSED = 141  # 128 + the signal, as shells report it
+_LONGEST = 200  # characters of a library's message
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command with its arguments (by default the process's) and give back the exit code."""
+    saying.occupy_standard_streams()
     try:
-        with warnings.catch_warnings():
-            warnings.showwarning = _show_warning
+        with stoppable(), _told_warnings() as told:
             args = _parse(sys.argv[1:] if argv is None else argv)
+            args.warnings = told
             args.run(args)
         return 0
     except InputError as error:
-        return _say("error", error, 2)
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has gone; what is still buffered must not fail again at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return PIPE_CLOSED
+        return _fail(error, 2)
     except RenderError as error:
-        return _say("error", error, 1)
+        return _fail(error, 1)
+    except Stopped as stop:
+        return stop.code
+    except BrokenPipeError:  # whoever read our output has gone
+        return PIPE_CLOSED
+    except MemoryError as error:
+        return _unexpected(f"there is not enough memory for this ({one_line(error) or 'how much is not known'})")
+    except Exception as error:
+        return _unexpected(
+            f"a fault of wgsss, not of the input ({type(error).__name__}: {one_line(error)[:_LONGEST]}): please report"
+            " it with the command and its files; WGSSS_DEBUG=1 shows where it happened"
+        )
 
 
 def _parse(argv: Sequence[str]) -> Any:
@@ -54,10 +67,35 @@ def _parse(argv: Sequence[str]) -> Any:
     return args
 
 
-def _show_warning(message: Warning | str, *where: Any, **more: Any) -> None:
-    _say("warning", message, 0)
+@contextmanager
+def _told_warnings() -> Iterator[list[str]]:
+    """Each Note in the block on standard error, once, and in the list. What libraries warn of is left out."""
+    told: list[str] = []
+
+    def show(message: Warning | str, *where: Any, **more: Any) -> None:
+        text = one_line(message)
+        if text not in told:
+            told.append(text)
+            saying.aside(f"wgsss: warning: {text}")
+
+    silent = logging.NullHandler()  # without any handler, Python prints what libraries log
+    logging.getLogger().addHandler(silent)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.filterwarnings("always", category=Note)
+            warnings.showwarning = show
+            yield told
+    finally:
+        logging.getLogger().removeHandler(silent)
 
 
-def _say(kind: str, message: object, code: int) -> int:
-    print(f"wgsss: {kind}: {' '.join(str(message).split())}", file=sys.stderr)
+def _fail(message: object, code: int) -> int:
+    saying.aside(f"wgsss: error: {one_line(message)}")
     return code
+
+
+def _unexpected(message: str) -> int:
+    if os.environ.get("WGSSS_DEBUG") == "1":
+        saying.aside(traceback.format_exc().rstrip())
+    return _fail(message, 1)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import re
+import sys
 import tomllib
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from wgsss import saying
 from wgsss.errors import InputError
+from wgsss.text import escaped, printable
 
 if TYPE_CHECKING:
     from wgsss.methods import Method
@@ -32,9 +34,13 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **rest: Any) -> None:
         super().__init__(**rest, allow_abbrev=False)
+        self._negative_number_matcher = re.compile(r"-(\d|\.|inf|nan)", re.IGNORECASE)  # -1e-1 is a value, no option
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see '{self.prog} --help')")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        (saying.aside if file is sys.stderr else saying.result)(message.rstrip("\n"))
 
     @property
     def options(self) -> list[str]:
@@ -115,18 +121,14 @@ def make_method(args: argparse.Namespace) -> Method:
     return make_method(name, dict(args.knobs))
 
 
-def tell(args: argparse.Namespace, result: Any, text: str) -> None:
-    """Print a command's result: as JSON where that was asked for, else as text."""
-    try:
-        print(json.dumps(result, indent=2, ensure_ascii=False) if args.json else text, flush=True)
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise InputError(f"standard output cannot be written ({error.strerror})") from None
+def tell(args: argparse.Namespace, result: dict[str, Any], text: str) -> None:
+    """Print a command's result: as JSON where that was asked for, which holds the warnings too, else as text."""
+    saying.result(saying.json_text({**result, "warnings": args.warnings}) if args.json else printable(text))
 
 
 def table(rows: list[list[str]]) -> str:
     """Rows of text in columns, one row a line."""
+    rows = [[escaped(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
 

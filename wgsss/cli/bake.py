@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 from wgsss.cli import arguments
+from wgsss.text import one_line
 
 
 def declare(commands: Any) -> None:
@@ -22,15 +23,15 @@ def run(args: Any) -> None:
     method = arguments.make_method(args)
     scene = arguments.load_scene(args)
     folder = cache.folder()
-    before = set(folder.glob("*.npz"))
+    before = cache.entries()
     start = time.perf_counter()
     stage = Stage(default_gpu(), scene)
     method.bake(stage)
     for body in stage.bodies:
         _ = body.environment
     seconds = time.perf_counter() - start
-    made = sorted(set(folder.glob("*.npz")) - before)
-    entries = [{"file": str(file), "bytes": file.stat().st_size} for file in made]
-    lines = [f"{file.name}  {file.stat().st_size / 1e6:.1f} MB" for file in made]
-    lines.append(f"{len(made) or 'no'} new entries in {folder}, {seconds:.2f} s")
+    made = {file: size for file, size in sorted(cache.entries().items()) if file not in before}
+    entries = [{"file": str(file), "bytes": size} for file, size in made.items()]
+    lines = [f"{file.name}  {size / 1e6:.1f} MB" for file, size in made.items()]
+    lines.append(f"{len(made) or 'no'} new entries in {one_line(folder)}, {seconds:.2f} s")
     arguments.tell(args, {"folder": str(folder), "made": entries, "seconds": round(seconds, 3)}, "\n".join(lines))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
+from wgsss import saying
 from wgsss.cli import arguments
 from wgsss.errors import InputError
+from wgsss.text import one_line
 
 _SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
 _FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
@@ -88,19 +89,17 @@ TABLES = {"speedup": _speedup}
 
 
 def _tell_cell(cell: Any) -> None:
-    if not sys.stderr.isatty():
+    if not saying.on_terminal():
         times = f"{cell.full_ms:.0f} ms to {cell.seen_ms:.0f} ms"
-        print(
-            f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times", file=sys.stderr, flush=True
-        )
+        saying.aside(f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times")
 
 
 def _tell(run: dict[str, Any]) -> None:
     """A line per run where no bar shows how far it is."""
-    if not sys.stderr.isatty():
+    if not saying.on_terminal():
         cells = dict(zip(_HEAD, _row(run), strict=True))
         setting = " ".join(filter(None, (cells["scene"], "by", cells["method"], cells["knobs"])))
-        print(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %", file=sys.stderr, flush=True)
+        saying.aside(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %"))
 
 
 def _rows(runs: list[dict[str, Any]]) -> list[list[str]]:

@@ -45,13 +45,13 @@ def _about_this_machine(args: Any) -> None:
         except PackageNotFoundError:
             versions[package] = "missing"
     found = [{key: a.info[key] for key in ("device", "adapter_type", "description", "vendor")} for a in adapters()]
-    files = [file.stat().st_size for file in cache.folder().glob("*.npz")]
+    sizes = cache.entries().values()
     result: dict[str, Any] = {
         "versions": versions,
         "platform": platform.platform(),
         "adapters": found,
         "chosen": None,
-        "cache": {"folder": str(cache.folder()), "entries": len(files), "bytes": sum(files)},
+        "cache": {"folder": str(cache.folder()), "entries": len(sizes), "bytes": sum(sizes)},
     }
     failure: InputError | None = None
     try:

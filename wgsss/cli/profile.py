@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wgsss import saying
 from wgsss.cli import arguments
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def run(args: Any) -> None:
 
         plot(found, _title(case), output)
     if args.csv:
-        print(_csv(rows, r), flush=True)
+        saying.result(_csv(rows, r))
     else:
         text = "\n".join([*_about(case), "", _totals(rows, args.k), *(["", _values(rows, r)] if args.r else [])])
         arguments.tell(args, {"material": material.name, "models": rows}, text + (f"\n\n{output}" if output else ""))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss.cli import arguments
+from wgsss.saying import progress
+from wgsss.text import one_line
 
 if TYPE_CHECKING:
     from wgsss.graph import Graph
@@ -95,9 +96,7 @@ def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
     aovs = AOVS if path.suffix.lower() in LINEAR_FORMATS else ()
     numbers: Any = range(args.frames)
     if args.frames > 1:
-        from tqdm import tqdm
-
-        numbers = tqdm(numbers, desc=path.name, unit="frame", file=sys.stderr, disable=None)  # None: only on a terminal
+        numbers = progress(numbers, desc=one_line(path.name), unit="frame")
     for number in numbers:
         yield renderer.frame(_time(args, number), aovs, timed=False)
 

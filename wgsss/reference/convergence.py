@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +14,7 @@ from wgsss.graph import Graph
 from wgsss.optics import Profile
 from wgsss.reference.kernel import make_kernel
 from wgsss.reference.surface_sum import Points, surface_sum
+from wgsss.saying import progress
 from wgsss.scene import Mesh
 from wgsss.stage import Body
 
@@ -53,8 +53,6 @@ def converged(body: Body, receivers: Samples, profile: Profile, tolerance: float
 def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spacing: float) -> SimpleNamespace:
     """front and back (N, 3) at places where L_d (N, 3) is known, by samples at most `spacing` mm apart, and how many
     `samples` that took."""
-    from tqdm import tqdm
-
     mesh = body.mesh
     across = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     chosen = subdivided(mesh, spacing)
@@ -63,7 +61,7 @@ def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spa
     kernel = make_kernel(profile, spacing, across)
     total = len(flux) * len(L_d)
     label = f"{mesh.name}, {len(flux)} samples"
-    with tqdm(total=total, desc=label, unit=" pairs", unit_scale=True, file=sys.stderr, disable=None) as bar:
+    with progress(total=total, desc=label, unit=" pairs", unit_scale=True) as bar:
         sources, places = (Points(at.position, at.normal) for at in (there, here))
         front, back = surface_sum(body.stage.gpu, kernel, sources, flux, places, bar)
     return SimpleNamespace(front=front + kernel.near * L_d, back=back, samples=len(flux))

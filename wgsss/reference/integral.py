@@ -15,6 +15,7 @@ from wgsss.bake.environment import prefilter
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
 from wgsss.emitters import emitters
+from wgsss.errors import Note
 from wgsss.frame import Frame, begin
 from wgsss.graph import Graph
 from wgsss.optics import Profile
@@ -141,7 +142,7 @@ def _cached(
         key += [index, profile.total, profile.reflectance(_PROBES)]
     found = cached("integral", key, make, code=_CODE)
     for note in filter(None, found["notes"].tolist()):
-        warnings.warn(note, stacklevel=3)
+        warnings.warn(note, Note, stacklevel=3)
     return found
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.cache import cached
-from wgsss.errors import InputError, RenderError
+from wgsss.errors import InputError, Note, RenderError
 from wgsss.reference import mitsuba_render, mitsuba_scene
 from wgsss.reference.mitsuba_xml import described
 from wgsss.scene import Scene
@@ -126,6 +126,7 @@ class Paths:
             warnings.warn(
                 f"no LLVM of at least version {_LEAST_LLVM} found (libllvm19 in Debian): Mitsuba follows one path after"
                 " another, on one core",
+                Note,
                 stacklevel=2,
             )
         environment = {**os.environ, **({"DRJIT_LIBLLVM_PATH": self._llvm} if self._llvm else {})}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.reference.mitsuba_xml import SMOOTH, described, environment_file, environments
 from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight
 
@@ -41,7 +41,7 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
     if notes:
-        warnings.warn(f"{scene.name}: Mitsuba will differ: {'; '.join(notes)}", stacklevel=2)
+        warnings.warn(f"{scene.name}: Mitsuba will differ: {'; '.join(notes)}", Note, stacklevel=2)
     return written
 
 

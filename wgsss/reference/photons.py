@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ from wgsss.graph import Graph
 from wgsss.optics import Layer, Photons
 from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.medium import check_index, stack
+from wgsss.saying import progress
 
 Array = NDArray[np.float64]
 
@@ -54,8 +54,6 @@ def trace(
     Raises:
         InputError: for what is not a stack, less than one photon or 2^31 and more, a negative seed.
     """
-    from tqdm import tqdm
-
     layers = stack(layers)
     if not (isinstance(photons, int | np.integer) and 1 <= photons < 2**31):
         raise InputError(f"photons must be a whole number from 1 to {2**31 - 1}, not {photons}")
@@ -64,7 +62,7 @@ def trace(
     check_index("eta_below", eta_below)
     shortest = 1.0 / max(layer.sigma_t_prime.max() for layer in layers)
     innermost = int(np.float32((_NEAREST * shortest) ** 2).view(np.uint32) >> 20)
-    with tqdm(total=3 * photons, desc=label, unit=" photons", unit_scale=True, file=sys.stderr, disable=None) as bar:
+    with progress(total=3 * photons, desc=label, unit=" photons", unit_scale=True) as bar:
         tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, sky, bar)
         keys = [np.random.SeedSequence([seed, channel]).generate_state(2) for channel in range(3)]
         counts = [tracer.follow(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]

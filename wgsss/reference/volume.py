@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import warnings
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -11,11 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.errors import Note
 from wgsss.frame import begin
 from wgsss.graph import Graph
 from wgsss.reference.estimate import Estimate, Reference
 from wgsss.reference.mitsuba_paths import Paths
 from wgsss.reference.mitsuba_scene import check
+from wgsss.saying import progress
 from wgsss.stage import Stage
 
 Array = npt.NDArray[Any]
@@ -51,19 +52,17 @@ class Volume(Reference):
         Raises InputError without Mitsuba, and for scenes that it cannot have (`mitsuba_scene.check`); RenderError where
         it fails.
         """
-        from tqdm import tqdm
-
         scene = stage.scene
         if notes := check(scene):
-            warnings.warn(f"{scene.name}: volume differs from what else we render: {'; '.join(notes)}", stacklevel=2)
+            note = f"{scene.name}: volume differs from what else we render: {'; '.join(notes)}"
+            warnings.warn(note, Note, stacklevel=2)
         bounded = any(thing.material.eta > 1 for thing in scene.objects)
         renderings = [(channel, scatters) for channel in range(3) for scatters in ((True, False)[: 1 + bounded])]
         pixels = _Pixels(stage, size)
-        shown = {"desc": "volume", "unit": " paths/pixel", "file": sys.stderr, "disable": None}
         scattered, variance = np.zeros((2, len(pixels.rays), 3))
         with (
             Paths(scene, size, pixels.rays) as paths,
-            tqdm(total=len(renderings) * self.samples, **shown) as bar,
+            progress(total=len(renderings) * self.samples, desc="volume", unit=" paths/pixel") as bar,
         ):
             for channel, scatters in renderings:
                 mean, square = paths.follow(channel, scatters, self.samples, bar)

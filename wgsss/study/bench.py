@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss.errors import InputError, unknown
+from wgsss.saying import progress
 
 if TYPE_CHECKING:
     from wgsss.scene import Scene
@@ -58,14 +58,12 @@ def bench(
             cannot be written, a scheduler that is not there.
         RenderError: where a number is not finite. The runs before it are kept.
     """
-    from tqdm import tqdm
-
     specs = [(scene, spec) for scene in scenes for spec in _specs(scene, methods, size, reference)]
     path = _prepared(Path(folder))
     with _cluster(scheduler) if scheduler else _here() as (adapters, runs):
         done = {_key(run): run for run in read(path.parent) if run["adapter"] in adapters}
         todo = [(scene, spec) for scene, spec in specs if _key(spec.json()) not in done]
-        bar = tqdm(total=len(specs), initial=len(specs) - len(todo), unit="run", file=sys.stderr, disable=None)
+        bar = progress(total=len(specs), initial=len(specs) - len(todo), unit="run")
         with bar:
             for run in runs(todo):
                 _append(path, run)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,10 +14,12 @@ from wgsss.gpu import default_gpu
 from wgsss.methods import METHODS, Method, make_method, name_of
 from wgsss.reference import REFERENCES, Estimate, Reference
 from wgsss.rendering import Image, Renderer
+from wgsss.saying import progress
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 from wgsss.study.cost import frame_cost
 from wgsss.study.metrics import Errors, errors
+from wgsss.text import one_line
 
 if TYPE_CHECKING:
     from wgsss.study.causes import Causes
@@ -106,8 +107,6 @@ def compare(
     Raises InputError for names that are not known and scenes that the reference cannot have, and RenderError where a
     number is not finite.
     """
-    from tqdm import tqdm
-
     made = named([make_method(method) if isinstance(method, str) else method for method in methods])
     truth_by = make_reference(reference) if isinstance(reference, str) else reference
     gpu = default_gpu()
@@ -115,7 +114,7 @@ def compare(
     image = shown(truth, truth_by, scene, size, time)
     seen = image.pixels[..., 3] > 0.0
     runs = []
-    for name, method in tqdm(made.items(), desc=scene.name, unit="method", file=sys.stderr, disable=None):
+    for name, method in progress(made.items(), desc=one_line(scene.name), unit="method"):
         run = _run(name, method, scene, size, time)
         found = errors(
             run["image"].aovs["M_front"] + run["image"].aovs["M_back"],

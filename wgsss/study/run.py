@@ -74,10 +74,10 @@ def measure(scene: Scene, spec: Spec) -> dict[str, Any]:
 def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
     gpu = default_gpu()
     truth, shown_truth = _truth(scene, spec)
-    known = _baked()
+    known = set(cache.entries())
     start = time.perf_counter()
     renderer = Renderer(scene, make_method(spec.method, spec.knobs), spec.size, gpu)
-    bake_ms, bake_cached = 1e3 * (time.perf_counter() - start), _baked() <= known
+    bake_ms, bake_cached = 1e3 * (time.perf_counter() - start), set(cache.entries()) <= known
     image = renderer.frame(aovs=("M_front", "M_back"), timed=False)  # the first frame pays for compilation
     cost = frame_cost(renderer, 0.0, FEWEST, FRAMES_S)
     found = errors(
@@ -159,8 +159,3 @@ def _truth(scene: Scene, spec: Spec) -> tuple[Estimate, Image]:
         estimate = method.estimate(Stage(default_gpu(), scene), spec.size)
         _last[key] = estimate, shown(estimate, method, scene, spec.size, 0.0)
     return _last[key]
-
-
-def _baked() -> set[str]:
-    """Entries of the cache."""
-    return {path.name for path in cache.folder().glob("*.npz")}

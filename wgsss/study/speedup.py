@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import product
@@ -25,6 +24,7 @@ from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
 from wgsss.output import replacing
 from wgsss.rendering import Renderer
+from wgsss.saying import progress
 from wgsss.scene import PerspectiveCamera, Scene
 from wgsss.scene.builtin import crowd
 
@@ -98,8 +98,6 @@ def speedup(
     Maps have about as many texels to the pixels of `size` (width, height) as the paper's. `tell` is called with each
     cell as it is done. Raises InputError where the file cannot be written.
     """
-    from tqdm import tqdm
-
     path = Path(folder) / FILE
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -109,7 +107,7 @@ def speedup(
     cells: list[Cell] = []
     clock = ""
     todo = list(product(enumerate(HEADS), enumerate(DISTANCES)))
-    for (row, heads), (column, distance) in tqdm(todo, unit="cell", file=sys.stderr, disable=None):
+    for (row, heads), (column, distance) in progress(todo, unit="cell"):
         scene = view(heads, distance)
         kinds = [
             Renderer(scene, make_method(name, {"map_size": map_size}), size) for name in ("texture+none", "jimenez08")

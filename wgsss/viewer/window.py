@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wgsss import saying
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
 from wgsss.methods import Method
@@ -202,6 +203,7 @@ class Window:
         command = self.state.command(self.side if side is None else side, self.full_size)
         with suppress(glfw.GLFWError):
             glfw.set_clipboard_string(self.canvas._window, command)
-        print(f"copied: {command}", flush=True)
+        with suppress(InputError, BrokenPipeError):
+            saying.result(f"copied: {command}")
         self.state.note(f"copied: {command}")
         return command

@@ -31,7 +31,7 @@ from wgsss.bake.sam.soundness import concerns
 from wgsss.bake.sam.top import best, select_top
 from wgsss.bake.sam.training import training
 from wgsss.bake.sam.tree import tree
-from wgsss.errors import InputError, unknown
+from wgsss.errors import InputError, Note, unknown
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
@@ -95,5 +95,5 @@ def _cached(
     key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), *samples]
     found = cached("sam", [*key, name, gpu.name], make, code=(choose, concerns, *_CODE[name]))
     if note := str(found["note"]):
-        warnings.warn(f"{mesh.name}: {note}", stacklevel=3)
+        warnings.warn(f"{mesh.name}: {note}", Note, stacklevel=3)
     return Entries.of(found)

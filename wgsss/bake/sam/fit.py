@@ -44,8 +44,6 @@ REFITS = 3
 def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     """The `n` senders of each vertex, and of some twice as many, and their weights, whose sum is nearest to its
     response to `training`."""
-    from threadpoolctl import threadpool_limits
-
     V = len(mesh.positions)
     K = QuickFormFactors(gpu, mesh, profile)
     s = senders(mesh, float(profile.range(0.01).max()))
@@ -67,24 +65,23 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
         return gathered(sender[rows], weight[rows], light)
 
     Patches.of(s, np.arange(V)).each(first, f"fitting {n} senders")
-    with threadpool_limits(1, "blas"):
-        weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
-        receivers = np.flatnonzero(weight.any(axis=(1, 2)))
-        twice = _worst(receivers, gather, responses)
-        row = np.full(V, -1)
-        row[twice] = V + np.arange(len(twice))
-        owner = np.concatenate([np.arange(V), twice])
-        sender, weight = (np.concatenate(pair) for pair in zip((sender, weight), empty(len(twice), n), strict=True))
-        Patches.of(s, twice).each(second, f"fitting {2 * n} senders")
-        sender[~weight.any(axis=2)] = -1
-        total *= _missed(s, K, total)
-        rows = np.flatnonzero(weight.any(axis=(1, 2)))
-        receivers = rows[rows < V]
-        mixed = mix(mesh.positions, mesh.normals, float(np.sqrt(s.area[:V].mean())), owner, rows, gather, responses)
-        for _ in range(REFITS if len(receivers) else 0):
-            refit(mixed, receivers, rows, sender, weight, light, responses)
-            weigh(mixed, receivers, gather, responses)
-        mixed.colour(weight.sum(axis=1), total)
+    weight[(weight.sum(axis=1) < FAINTEST * profile.total).all(axis=1)] = 0.0
+    receivers = np.flatnonzero(weight.any(axis=(1, 2)))
+    twice = _worst(receivers, gather, responses)
+    row = np.full(V, -1)
+    row[twice] = V + np.arange(len(twice))
+    owner = np.concatenate([np.arange(V), twice])
+    sender, weight = (np.concatenate(pair) for pair in zip((sender, weight), empty(len(twice), n), strict=True))
+    Patches.of(s, twice).each(second, f"fitting {2 * n} senders")
+    sender[~weight.any(axis=2)] = -1
+    total *= _missed(s, K, total)
+    rows = np.flatnonzero(weight.any(axis=(1, 2)))
+    receivers = rows[rows < V]
+    mixed = mix(mesh.positions, mesh.normals, float(np.sqrt(s.area[:V].mean())), owner, rows, gather, responses)
+    for _ in range(REFITS if len(receivers) else 0):
+        refit(mixed, receivers, rows, sender, weight, light, responses)
+        weigh(mixed, receivers, gather, responses)
+    mixed.colour(weight.sum(axis=1), total)
     is_mean = sender >= V
     used, at = np.unique(sender[is_mean] - len(s.area), return_inverse=True)
     sender[is_mean] = V + at

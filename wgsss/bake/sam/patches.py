@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from wgsss.bake.sam.blend import WIDTHS
 from wgsss.bake.sam.quick import QuickFormFactors
 from wgsss.bake.sam.rows import Senders, reaching
+from wgsss.saying import progress
 
 Array = npt.NDArray[Any]
 
@@ -48,14 +48,9 @@ class Patches:
 
     def each(self, work: Callable[[Patches], None], label: str) -> None:
         """Work on some at a time, on all cores."""
-        from threadpoolctl import threadpool_limits
-        from tqdm import tqdm
-
         parts = [Patches(self.node[i : i + _AT_ONCE], self.leaf) for i in range(0, len(self.node), _AT_ONCE)]
-        # Threads of ours: products of many small matrices are no work for those of a BLAS.
         with (
-            tqdm(total=len(self.node), desc=label, unit=" patches", file=sys.stderr, disable=None) as bar,
-            threadpool_limits(1, "blas"),
+            progress(total=len(self.node), desc=label, unit=" patches") as bar,
             ThreadPoolExecutor(os.cpu_count()) as pool,
         ):
             for part, _ in zip(parts, pool.map(work, parts), strict=True):

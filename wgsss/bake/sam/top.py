@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -17,6 +16,7 @@ from wgsss.bake.sam.form_factors import MOST, FormFactors
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
+from wgsss.saying import progress
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -43,13 +43,12 @@ def best(gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None =
     order are integrated. Beyond the distance from where a share BEYOND of the light of a plane comes, nothing is
     looked for. Where `sending` (V,) is given, only those vertices send, and only the others receive.
     """
-    from tqdm import tqdm
 
     sender, weight = empty(len(mesh.positions), n)
     factors = FormFactors(gpu, mesh, profile)
     search = Search(gpu, mesh, profile, factors, n + 5 + n // 2, sending)
     shown: dict[str, Any] = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
-    with tqdm(total=len(mesh.positions), file=sys.stderr, disable=None, **shown) as bar:
+    with progress(total=len(mesh.positions), **shown) as bar:
         for receivers, found in search:
             rough = _factors(factors, receivers, found, most=1).sum(axis=2)
             found = np.take_along_axis(found, np.argsort(-rough, axis=1, kind="stable")[:, :n], axis=1)

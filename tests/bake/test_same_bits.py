@@ -1,0 +1,60 @@
+"""What is baked has the same bits, however many threads numpy's BLAS may use."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+SCRIPT = """
+import sys
+from wgsss.gpu import default_gpu
+from wgsss.methods import make_method
+from wgsss.rendering import Renderer
+from wgsss.scene import load_scene
+from wgsss.stage import Stage
+
+ear, wave = load_scene("ear", vertices=1500), load_scene("wave", vertices=500)
+methods = {"deon07": {"map_size": 64}, "barre11": {}, "jensen02": {"spacing": 3.0}, "jimenez15": {}, "jimenez08": {"map_size": 64}, "sam": {}}
+for name, knobs in [*methods.items(), *(("sam", {"select": select}) for select in ("top", "coarse"))]:
+    Renderer(ear, make_method(name, knobs), (16, 16))
+Renderer(wave, make_method("sam"), (16, 16)).frame(0.5)
+make_method("integral", {"samples": 5000}).estimate(Stage(default_gpu(), ear), (8, 8))
+"""
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """What is baked where BLAS has one thread, and two."""
+    found = []
+    for threads in ("1", "2"):
+        folder = tmp_path_factory.mktemp(f"threads{threads}")
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "WGSSS_CACHE": str(folder)}
+        environment |= {f"{library}_NUM_THREADS": threads for library in ("OPENBLAS", "OMP", "MKL", "VECLIB")}
+        subprocess.run([sys.executable, "-W", "ignore", "-c", SCRIPT], env=environment, check=True, timeout=300)
+        found.append(folder)
+    return found
+
+
+def test_every_kind_of_entry_is_tried(folders: list[Path]) -> None:
+    source = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "wgsss").rglob("*.py"))
+    kinds = set(re.findall(r'\bcached\(\s*"([^"]+)"', source))
+    assert len(kinds) > 10
+    made = {path.name.rsplit("-", 1)[0] for path in folders[0].iterdir()}
+    assert kinds - {"volume"} <= made  # volume is of numbers that Mitsuba makes
+
+
+def test_one_and_two_threads_bake_the_same_bits(folders: list[Path]) -> None:
+    one, two = ({path.name: path for path in folder.iterdir()} for folder in folders)
+    assert one.keys() == two.keys()  # the names are made of what goes into the bakes
+    for name in one:
+        with np.load(one[name]) as first, np.load(two[name]) as second:
+            assert first.files == second.files
+            differ = [part for part in first.files if first[part].tobytes() != second[part].tobytes()]
+        assert not differ, f"{name}: {differ}"

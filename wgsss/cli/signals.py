@@ -1,0 +1,62 @@
+"""Signals that end a command as an exception, so that what it began is cleaned up."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
+_AGAIN_S = 0.02  # after which a signal whose exception was lost is raised once more
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal asked the command to end. All that handles an interrupt from the keyboard handles it too."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.code = 128 + number
+        """the exit code, as shells report it"""
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Raise Stopped in the block at the first signal that asks to end, and ignore those that follow.
+
+    A signal that is ignored already, as by nohup, stays so. After Stopped the process is about to end, and signals stay
+    ignored. Only the main thread can do this; in another one nothing is changed.
+    """
+    stopped = False
+
+    def stop(number: int, frame: Any) -> None:
+        nonlocal stopped
+        if not stopped:
+            stopped = True
+            raise Stopped(number)
+
+    def unraisable(lost: Any) -> None:
+        nonlocal stopped
+        if isinstance(lost.exc_value, Stopped):  # it came where Python drops exceptions, as when an object is freed
+            stopped = False
+            threading.Timer(_AGAIN_S, _thread.interrupt_main, (lost.exc_value.code - 128,)).start()
+        else:
+            before_hook(lost)
+
+    before: dict[int, Any] = {}
+    before_hook = sys.unraisablehook
+    if threading.current_thread() is threading.main_thread():
+        for number in (getattr(signal, name) for name in _ENDING if hasattr(signal, name)):
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                before[number] = signal.signal(number, stop)
+        sys.unraisablehook = unraisable
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before_hook
+        if not stopped:
+            for number, handler in before.items():
+                signal.signal(number, handler)

@@ -1,0 +1,35 @@
+"""Text that comes from users, where it is shown: names of scenes, materials and files may hold anything."""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+from typing import Any
+
+_HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode's categories of control, format, surrogate and separator
+_JOINERS = "\u200c\u200d"  # between letters of some scripts, and in emoji
+
+
+def escaped(text: object) -> str:
+    """Text in which what does not show, breaks the line or turns the direction of writing is an escape, as \\x1b."""
+    return "".join(_escape(c) if c not in _JOINERS and unicodedata.category(c) in _HIDDEN else c for c in str(text))
+
+
+def one_line(text: object) -> str:
+    """Escaped text, whose white space becomes single spaces."""
+    return escaped(" ".join(str(text).split()))
+
+
+def printable(text: str) -> str:
+    """Escaped lines."""
+    return "\n".join(escaped(line) for line in text.split("\n"))
+
+
+def script_json(value: Any) -> str:
+    """A value as JSON that is safe inside of a <script> of a page, whatever strings it holds."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return "".join(f"\\u{ord(c):04x}" if c in "<>&\u2028\u2029" or "\ud800" <= c <= "\udfff" else c for c in text)
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape").decode()
