@@ -44,7 +44,7 @@ def test_text_and_files(tmp_path: Path, capsys, monkeypatch):
 def test_json(tmp_path: Path, capsys):
     out, _ = run(capsys, *SMALL, "-o", str(tmp_path / "here"), "--json")
     found = json.loads(out)
-    assert found.keys() == {"scene", "reference", "adapter", "size", "methods", "files"}
+    assert found.keys() == {"scene", "reference", "adapter", "size", "methods", "files", "warnings"}
     assert found["scene"] == "sphere" and found["size"] == [32, 32]
     assert all(Path(file).is_file() and Path(file).parent == tmp_path / "here" for file in found["files"])
 

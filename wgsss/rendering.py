@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import frame as shared
-from wgsss.errors import InputError, RenderError, unknown
-from wgsss.gpu import LIMITS, Gpu, default_gpu
+from wgsss.errors import RenderError, unknown
+from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph, Handle
 from wgsss.methods import Method, make_method, name_of
-from wgsss.scene import Scene
+from wgsss.scene import Scene, checks
 from wgsss.stage import Stage
 
 Array = npt.NDArray[Any]
@@ -85,9 +85,7 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene, method: Method, size: tuple[int, int], gpu: Gpu | None = None) -> None:
-        largest = LIMITS["max-texture-dimension-2d"]
-        if not all(isinstance(n, int) and 1 <= n <= largest for n in size):
-            raise InputError(f"the image size must be 1 to {largest} pixels a side, not {size[0]} x {size[1]}")
+        checks.image_size(size)
         self.gpu = gpu or default_gpu()
         self.gpu.trim()  # or what frames of all earlier sizes, scenes and knobs needed would be kept
         self.method, self.size = method, size

@@ -25,6 +25,19 @@ def printable(text: str) -> str:
     return "\n".join(escaped(line) for line in text.split("\n"))
 
 
+def shortened(text: object, most: int) -> str:
+    """One line of text, of `most` characters at most."""
+    line = one_line(text)
+    return line if len(line) <= most else line[: most - 1] + "…"
+
+
+def figure_text(text: object, most: int = 80) -> str:
+    """A line of text for matplotlib, which would read what is between two $ as TeX, and leave a label with a leading _
+    out of legends."""
+    line = shortened(text, most).replace("$", r"\$")
+    return f" {line}" if line.startswith("_") else line
+
+
 def script_json(value: Any) -> str:
     """A value as JSON that is safe inside of a <script> of a page, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -21,8 +21,9 @@ from wgsss.scene import load_scene
 from wgsss.stage import Stage
 
 ear, wave = load_scene("ear", vertices=1500), load_scene("wave", vertices=500)
-methods = {"deon07": {"map_size": 64}, "barre11": {}, "jensen02": {"spacing": 3.0}, "jimenez15": {}, "jimenez08": {"map_size": 64}, "sam": {}}
-for name, knobs in [*methods.items(), *(("sam", {"select": select}) for select in ("top", "coarse"))]:
+methods = [("deon07", {"map_size": 64}), ("jimenez08", {"map_size": 64}), ("barre11", {}), ("jimenez15", {})]
+methods += [("jensen02", {"spacing": 3.0}), *(("sam", {"select": select}) for select in ("fit", "top", "coarse"))]
+for name, knobs in methods:
     Renderer(ear, make_method(name, knobs), (16, 16))
 Renderer(wave, make_method("sam"), (16, 16)).frame(0.5)
 make_method("integral", {"samples": 5000}).estimate(Stage(default_gpu(), ear), (8, 8))

@@ -92,7 +92,7 @@ def test_the_command_prints_the_table_and_the_file(clock, capsys):
         (["--table", "speedup"], "is of the scene crowd"),
         (["ear", "--table", "speedup"], "is of the scene crowd"),
         (["crowd", "--table", "speedup", "--methods", "sam"], "is of two methods"),
-        (["crowd", "--table", "speedup", "-o", "file"], "file/speedup.json: cannot be written"),
+        (["crowd", "--table", "speedup", "-o", "file"], "file: this is not a folder"),
         (["crowd", "--table", "other"], "invalid choice: 'other'"),
     ],
 )

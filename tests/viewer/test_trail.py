@@ -109,7 +109,20 @@ def written(folder: Path, state: State, change: Callable[[dict[str, Any]], Any] 
     for method, knobs, ms, error in (("lambert", {}, 10.0, 0.5), ("jimenez15", {"taps": 9}, 20.0, 0.1)):
         run: dict[str, Any] = {"scene": "slab", "digest": digest(state.opened), "method": method, "knobs": knobs}
         run |= {"size": [64, 64], "reference": "integral", "version": "1", "adapter": adapter(), "step": 0}
-        run |= {"frame_ms": ms, "error": {"rel_rmse": error}, "date": "2026-01-01", "floor": 0.0}
+        run |= {
+            "frame_ms": ms,
+            "frame_ms_quartiles": [ms, ms],
+            "frames": 9,
+            "passes": {},
+            "bytes": 7,
+            "clock": "sundial",
+        }
+        run |= {
+            "error": {"rel_rmse": error, "psnr": None, "flip": None, "bias": None},
+            "date": "2026-01-01",
+            "floor": 0.0,
+        }
+        run |= {"bake_ms": 1.0, "bake_cached": True, "clock": "sundial"}
         change(run)
         runs.append(run)
     (folder / "bench").mkdir()

@@ -21,7 +21,7 @@ from wgsss.cli.signals import Stopped, stoppable
 from wgsss.errors import InputError, Note, RenderError, unknown
 from wgsss.text import one_line
 
-PIPE_CLOSED = 141  # 128 + the signal, as shells report it
+INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as shells report them
 _LONGEST = 200  # characters of a library's message
 
 
@@ -40,6 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error, 1)
     except Stopped as stop:
         return stop.code
+    except KeyboardInterrupt:
+        return INTERRUPTED
     except BrokenPipeError:  # whoever read our output has gone
         return PIPE_CLOSED
     except MemoryError as error:

@@ -135,15 +135,20 @@ def table(rows: list[list[str]]) -> str:
 
 def size(text: str) -> tuple[int, int]:
     """WIDTHxHEIGHT in pixels."""
-    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
+    from wgsss.scene.checks import MOST_PIXELS
+
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
         raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT, such as 512x512")
-    return int(match[1]), int(match[2])
+    found = int(match[1]), int(match[2])
+    if not all(1 <= side <= MOST_PIXELS for side in found):
+        raise argparse.ArgumentTypeError(f"the image size must be 1 to {MOST_PIXELS} pixels a side, not {text}")
+    return found
 
 
 def count(text: str) -> int:
     """A whole number from 1 to 999999999."""
-    if not re.fullmatch(r"\d{1,9}", text) or int(text) == 0:
+    if not re.fullmatch(r"[0-9]{1,9}", text) or int(text) == 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to 999999999")
     return int(text)
 

@@ -10,14 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
+from wgsss.folders import appearing, made
 from wgsss.reference.mitsuba_xml import SMOOTH, described, environment_file, environments
-from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight
+from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight, checks
 
 Array = npt.NDArray[Any]
 
 
 def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path]:
-    """Write `scene`, as it stands, to `folder`, which is made: `mitsuba FOLDER/scene.xml` renders it as is.
+    """Write `scene`, as it stands, to `folder`, which is made: `mitsuba FOLDER/scene.xml` renders it as is. All files
+    appear at once or none does.
 
     What the two renderers do not share is told in one warning. The integrator is `volpathmis`, whose paths serve the
     three channels of a medium at once.
@@ -33,13 +35,12 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
         notes.append("base colours are left out")
     if len(scene.lights) > 1 and any(isinstance(light, RectLight | SphereLight) for light in scene.lights):
         notes.append("lamps hide what is behind them")
+    checks.image_size(size)
     folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [folder / "scene.xml", *write_meshes(scene, folder), *write_environment(scene, folder)]
-        written[0].write_text(described(scene, size))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    with made(folder.parent), appearing(folder) as place:
+        files = [place / "scene.xml", *write_meshes(scene, place), *write_environment(scene, place)]
+        files[0].write_text(described(scene, size), encoding="utf-8")
+    written = [folder / file.name for file in files]
     if notes:
         warnings.warn(f"{scene.name}: Mitsuba will differ: {'; '.join(notes)}", Note, stacklevel=2)
     return written

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.animation import Animation, choose_clip, first_of_equal
 from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
@@ -144,7 +144,7 @@ class _File:
             self.say(note)
 
     def say(self, note: str) -> None:
-        warnings.warn(f"{self.path.name}: {note}", stacklevel=2)
+        warnings.warn(f"{self.path.name}: {note}", Note, stacklevel=2)
 
     def bodies(self, groups: dict[Look, list[int]]) -> tuple[LoadedMesh, ...]:
         """A body for each look, of parts by number."""

@@ -18,6 +18,8 @@ Triple = tuple[float, float, float]
 # other numbers (its intensity is 3e25 W/sr).
 LARGEST_SIGNED, LARGEST = 1e15, 3e38
 
+MOST_PIXELS = 8192  # of a side of a picture: what every device has textures for
+
 
 def number(owner: object, field: str, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
     """Check that a field is a finite number in low..high; `above` excludes low itself."""
@@ -55,6 +57,13 @@ def triple(
     if nonzero and math.hypot(*parts) < 1 / LARGEST_SIGNED:
         raise InputError(f"{field} must not be the zero vector")
     object.__setattr__(owner, field, tuple(float(p) for p in parts))
+
+
+def image_size(size: tuple[int, int]) -> None:
+    """Check the width and height of a picture, in pixels."""
+    if len(size) != 2 or not all(_is_number(n) and int(n) == n and 1 <= n <= MOST_PIXELS for n in size):
+        shown = " x ".join(map(_show, size))
+        raise InputError(f"the image size must be 1 to {MOST_PIXELS} pixels a side, not {shown}")
 
 
 def not_parallel(first: Iterable[float], second: Iterable[float], message: str) -> None:

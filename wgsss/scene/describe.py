@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.animation import NONE
 from wgsss.scene.files import SUFFIXES, read_file
 from wgsss.scene.images import read_radiance
@@ -29,7 +29,8 @@ def describe(path: Path) -> Described:
     """
     suffix = path.suffix.lower()
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("always", category=Note)
         if suffix in SUFFIXES:
             found = _mesh_file(path)
         elif suffix == ".toml":

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from wgsss.errors import InputError, unknown
+from wgsss.errors import InputError, Note, unknown
 from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, framing
@@ -107,7 +107,8 @@ def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: boo
 
 def _left_out(path: Path, count: int, what: str, option: str) -> None:
     not_used = "is not used ({} uses it)" if count == 1 else "are not used ({} uses them)"
-    warnings.warn(f"{path.name}: {counted(count, what)} of the file {not_used.format(option)}", stacklevel=2)
+    note = f"{path.name}: {counted(count, what)} of the file {not_used.format(option)}"
+    warnings.warn(note, Note, stacklevel=2)
 
 
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:

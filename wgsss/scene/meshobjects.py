@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.bodies import LoadedFile, LoadedMesh
 from wgsss.scene.checks import Triple
 from wgsss.scene.defaults import DEFAULT_MATERIAL
@@ -68,7 +68,7 @@ def own_material(body: LoadedMesh) -> Material:
                 eta=GLTF_ETA,
             )
         except InputError as error:
-            warnings.warn(f"{error}; {DEFAULT_MATERIAL.name} in its place", stacklevel=2)
+            warnings.warn(f"{error}; {DEFAULT_MATERIAL.name} in its place", Note, stacklevel=2)
     return Chosen(replace(material, **values), coloured=False).on(body.maps, body.mesh.corner_colors is not None)
 
 
@@ -97,6 +97,7 @@ def _check_size(found: list[Object], file: LoadedFile, chosen: Chosen | None, wh
         warnings.warn(
             f"{where}: the mesh is {side:.3g} mm long and light spreads {reach:.2g} mm in {material.name}, so it "
             f"{effect}{advice}",
+            Note,
             stacklevel=3,
         )
         return

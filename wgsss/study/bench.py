@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wgsss.errors import InputError, unknown
 from wgsss.saying import progress
+from wgsss.study.run_line import Run
+from wgsss.study.runs import FILE, appended, read
 
 if TYPE_CHECKING:
     from wgsss.scene import Scene
     from wgsss.study.run import Spec
 
-Run = dict[str, Any]
-"""what `wgsss.study.run.measure` gives back: what a line of the file holds"""
+__all__ = ["FILE", "Run", "bench", "read"]
 
 Task = tuple["Scene", "Spec"]
 Place = tuple[set[str], Callable[[Sequence[Task]], Iterator[Run]]]
 """where runs are done: its adapters, and what does them"""
 
-FILE = "runs.jsonl"
 DEFAULT_REFERENCE = "integral"
 _SAME = ("scene", "digest", "method", "knobs", "size", "reference", "version")
 
@@ -40,8 +39,9 @@ def bench(
 ) -> list[Run]:
     """Measure each of `methods` (by default all) at each setting of its sweep, in each scene, against a reference.
 
-    Runs are appended to `runs.jsonl` in `folder` as they end, and those that are there already, of the same scene,
-    method, knobs, size, reference, adapter and version, are not done again: what is stopped goes on where it was.
+    Runs are appended to `runs.jsonl` in `folder`, which is made, as they end, and those that are there already, of the
+    same scene, method, knobs, size, reference, adapter and version, are not done again: what is stopped goes on where
+    it was.
 
     Args:
         size: width and height, pixels.
@@ -59,39 +59,17 @@ def bench(
         RenderError: where a number is not finite. The runs before it are kept.
     """
     specs = [(scene, spec) for scene in scenes for spec in _specs(scene, methods, size, reference)]
-    path = _prepared(Path(folder))
-    with _cluster(scheduler) if scheduler else _here() as (adapters, runs):
-        done = {_key(run): run for run in read(path.parent) if run["adapter"] in adapters}
+    with _cluster(scheduler) if scheduler else _here() as (adapters, runs), appended(Path(folder)) as (before, append):
+        done = {_key(run): run for run in before if run["adapter"] in adapters}
         todo = [(scene, spec) for scene, spec in specs if _key(spec.json()) not in done]
         bar = progress(total=len(specs), initial=len(specs) - len(todo), unit="run")
         with bar:
             for run in runs(todo):
-                _append(path, run)
+                append(run)
                 done[_key(run)] = run
                 bar.update()
                 tell(run)
     return [done[_key(spec.json())] for _, spec in specs]
-
-
-def read(folder: str | Path) -> list[Run]:
-    """The runs in a folder, in the order in which they ended. A last line that was cut off is no run.
-
-    Raises InputError where there are none, and for a line that is not a run.
-    """
-    path = Path(folder) / FILE
-    try:
-        lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    runs = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            run = json.loads(line)
-            _key(run), run["adapter"], run["frame_ms"], run["error"]["rel_rmse"]
-        except (ValueError, KeyError, TypeError):
-            raise InputError(f"{path}: line {number} is not a run") from None
-        runs.append(run)
-    return runs
 
 
 def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[Spec]:
@@ -115,32 +93,6 @@ def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], r
 
 def _key(run: Run) -> str:
     return json.dumps([run[name] for name in _SAME], sort_keys=True)
-
-
-def _prepared(folder: Path) -> Path:
-    """The file of a folder, made where it is missing; what was cut off at its end is dropped."""
-    path = folder / FILE
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with path.open("a+b") as file:
-            file.seek(0)
-            whole = file.read()
-            file.truncate(whole.rfind(b"\n") + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    return path
-
-
-def _append(path: Path, run: Run) -> None:
-    """One write, so that a line is there as a whole or not at all, also where several processes append."""
-    line = json.dumps(run, ensure_ascii=False, allow_nan=False) + "\n"
-    file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-    try:
-        os.write(file, line.encode())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        os.close(file)
 
 
 @contextmanager

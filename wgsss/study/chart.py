@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from wgsss.errors import InputError
 from wgsss.output import replacing
+from wgsss.text import figure_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +22,8 @@ Label = tuple[float, float, str, Any]
 """time, error, text and colour"""
 
 FILES = ("chart.svg", "chart.png", "chart.html")
+LEAST = 1e-9
+"""relative error above which a run is drawn: the axis is logarithmic"""
 
 # Okabe and Ito's colours, which all eyes tell apart, and shapes for prints without: corners, whether a star, degrees.
 _COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
@@ -31,6 +34,7 @@ _PLACES = ("lambert", "deon07", "sam", "jensen02", "jimenez15", "jimenez08", "ba
 _INK, _FAINT, _FRONT, _FLOOR = "#333333", "#767676", "#555555", "#EBEBEB"
 _LOOK: dict[Any, Any] = {"font.size": 9.5, "svg.hashsalt": "wgsss", "text.color": _INK, "axes.edgecolor": _FAINT}
 _COLUMNS = 3
+_LONGEST_CAPTION = 2000  # characters
 _OFFSETS = (
     *((7, 6), (7, -14), (-7, 6), (-7, -14), (0, 11), (0, -19), (11, -4), (-11, -4)),
     *((16, 14), (-16, -22), (-16, 14), (16, -22), (0, 22), (0, -30), (26, 4), (-26, -12)),
@@ -115,7 +119,11 @@ def style(method: str) -> tuple[str, tuple[int, int, int]]:
 
 
 def _place(method: str) -> int:
-    return _PLACES.index(method) if method in _PLACES else len(_PLACES) + zlib.crc32(method.encode()) % 1000
+    return (
+        _PLACES.index(method)
+        if method in _PLACES
+        else len(_PLACES) + zlib.crc32(method.encode("utf-8", "surrogatepass")) % 1000
+    )
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
@@ -169,7 +177,7 @@ def _figure(found: Sequence[Panel]) -> Any:
     columns = min(len(found), _COLUMNS)
     rows = -(-len(found) // columns)
     size = (max(5.0 * columns, 6.4), 4.4 * rows + 1.2)
-    text = textwrap.fill(caption(found), round(15.5 * size[0]))
+    text = textwrap.fill(figure_text(caption(found), _LONGEST_CAPTION), round(15.5 * size[0]))
     below = (0.22 + 0.15 * text.count("\n")) / size[1]
     layout = ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below), w_pad=0.08, h_pad=0.08)
     figure = Figure(figsize=size, layout=layout, facecolor="white")
@@ -179,7 +187,9 @@ def _figure(found: Sequence[Panel]) -> Any:
     placed = [(axis, _panel(axis, panel)) for axis, panel in zip(axes, found, strict=False)]
     methods = sorted({method for panel in found for method in panel.methods}, key=lambda m: (_place(m), m))
     keys = [_mark(style(method), True) for method in methods]
-    handles = [Line2D([], [], ls="--", lw=1.2, label=m, **key) for m, key in zip(methods, keys, strict=True)]
+    handles = [
+        Line2D([], [], ls="--", lw=1.2, label=figure_text(m), **key) for m, key in zip(methods, keys, strict=True)
+    ]
     handles.append(Line2D([], [], color=_FRONT, lw=1.8, label="best for its time"))
     figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 2 + 3 * columns), frameon=False)
     figure.text(0.1 / size[0], 0.08 / size[1], text, fontsize=8, color=_FAINT)
@@ -199,7 +209,7 @@ def _mark(kind: tuple[str, tuple[int, int, int]], best: bool) -> dict[str, Any]:
 
 def _panel(axis: Axes, panel: Panel) -> list[Label]:
     """Draw the marks, and give back the labels that they want."""
-    shown = [run for run in panel.runs if (run["error"]["rel_rmse"] or 0.0) > 0.0]
+    shown = [run for run in panel.runs if (run["error"]["rel_rmse"] or 0.0) > LEAST]
     points = [(run["frame_ms"], 100.0 * run["error"]["rel_rmse"]) for run in shown]
     if points:
         _scales(axis, shown, points, 100.0 * panel.floor)
@@ -220,7 +230,7 @@ def _panel(axis: Axes, panel: Panel) -> list[Label]:
             axis.plot(*points[i], **_mark(style(method), i in best), zorder=5 if i in best else 4)
         texts = labels([shown[i] for i in own])
         wanted += [(*points[i], text, _dark(colour)) for i, text in zip(own, texts, strict=True)]
-    axis.set_title(panel.title, loc="left", fontweight="bold", fontsize=11)
+    axis.set_title(figure_text(panel.title), loc="left", fontweight="bold", fontsize=11)
     axis.set_xlabel("frame time, ms")
     axis.set_ylabel("relative RMSE of M")
     axis.spines[["top", "right"]].set_visible(False)
@@ -232,7 +242,7 @@ def _panel(axis: Axes, panel: Panel) -> list[Label]:
 def _scales(axis: Axes, shown: Sequence[Run], points: Sequence[tuple[float, float]], floor: float) -> None:
     """Logarithmic axes around all points, and the band below which the reference itself is no better."""
     times = [t for run in shown for t in run["frame_ms_quartiles"]] + [x for x, _ in points]
-    errors = [y for _, y in points] + ([floor] if floor > 0.0 else [])
+    errors = [y for _, y in points] + ([floor] if floor > LEAST else [])
     for one, values, unit in ((axis.xaxis, times, ""), (axis.yaxis, errors, " %")):
         spread = max(math.log10(max(values) / min(values)), 0.5)
         low, high = min(values) * 10.0 ** (-0.1 * spread), max(values) * 10.0 ** (0.1 * spread)
@@ -240,7 +250,7 @@ def _scales(axis: Axes, shown: Sequence[Run], points: Sequence[tuple[float, floa
         at = ticks(low, high)
         one.set_ticks(at, [f"{value:g}{unit}" for value in at])
         one.set_ticks([], minor=True)
-    if floor > 0.0:
+    if floor > LEAST:
         axis.axhspan(axis.get_ylim()[0], floor, color=_FLOOR, lw=0, zorder=0)
         corner: dict[str, Any] = {"xytext": (4, 4), "textcoords": "offset points", "fontsize": 8, "color": _FAINT}
         axis.annotate("the reference's own error", (axis.get_xlim()[0], axis.get_ylim()[0]), **corner)
@@ -259,7 +269,7 @@ def _place_labels(axis: Axes, wanted: Sequence[Label]) -> None:
             side = "left" if dx > 0 else "right" if dx < 0 else "center"
             look: dict[str, Any] = {"ha": side, "fontsize": 8, "color": colour, "zorder": 6}
             look["path_effects"] = [withStroke(linewidth=2.5, foreground="white")]
-            label = axis.annotate(text, (x, y), xytext=(dx, dy), textcoords="offset points", **look)
+            label = axis.annotate(figure_text(text), (x, y), xytext=(dx, dy), textcoords="offset points", **look)
             box = label.get_window_extent().extents
             inside = frame.x0 <= box[0] and box[2] <= frame.x1 and frame.y0 <= box[1] and box[3] <= frame.y1
             if inside and not any(_overlap(box, other) for other in taken):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from wgsss.study import page as pages
 
 if TYPE_CHECKING:
     from wgsss.study.chart import Panel
@@ -24,13 +24,7 @@ def page(panels: Sequence[Panel], caption: str) -> str:
         "methods": {method: dict(zip(("colour", "shape"), style(method), strict=True)) for method in methods},
         "panels": [{"title": panel.title, "floor": panel.floor, "runs": _runs(panel)} for panel in panels],
     }
-    here = Path(__file__).parent
-    text = (here / "chart.html").read_text(encoding="utf-8")
-    parts = {"STYLE": (here / "chart.css").read_text("utf-8"), "SCRIPT": (here / "chart.js").read_text("utf-8")}
-    parts["DATA"] = json.dumps(data, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    for name, part in parts.items():
-        text = text.replace(f"/*{name}*/", part)
-    return text
+    return pages.page("chart", data)
 
 
 def _runs(panel: Panel) -> list[dict[str, Any]]:

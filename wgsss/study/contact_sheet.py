@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wgsss.study import error_maps, tables
 from wgsss.study.compare import Comparison, Run
+from wgsss.text import figure_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,9 +53,11 @@ def draw(comparison: Comparison, path: Path) -> None:
 
 def _words(figure: Figure, comparison: Comparison, width: float, height: float) -> None:
     title = f"{comparison.scene} against {comparison.reference}"
-    figure.text(_EDGE / width, 1 - 0.2 / height, title, color=_INK, fontsize=15, va="top", weight="bold")
+    figure.text(_EDGE / width, 1 - 0.2 / height, figure_text(title), color=_INK, fontsize=15, va="top", weight="bold")
     caption = f"{comparison.size[0]} x {comparison.size[1]}, {comparison.adapter}"
-    figure.text(1 - _EDGE / width, 1 - 0.25 / height, caption, color=_FAINT, fontsize=8.5, va="top", ha="right")
+    figure.text(
+        1 - _EDGE / width, 1 - 0.25 / height, figure_text(caption), color=_FAINT, fontsize=8.5, va="top", ha="right"
+    )
 
 
 def _reference(axes: list[Axes], comparison: Comparison, end: float) -> None:
@@ -102,7 +105,7 @@ def _method(axes: list[Axes], comparison: Comparison, run: Run, error: Array, en
 
 def _label(axis: Axes, name: str, lines: dict[str, str]) -> None:
     axis.set_axis_off()
-    axis.text(0.0, 1.0, name.replace(" ", "\n"), color=_INK, fontsize=13, weight="bold", va="top")
+    axis.text(0.0, 1.0, "\n".join(map(figure_text, name.split())), color=_INK, fontsize=13, weight="bold", va="top")
     text = "\n".join(f"{key:<9}{value}" for key, value in lines.items())
     axis.text(0.0, 0.0, text, color=_FAINT, fontsize=8, va="bottom", family="monospace", linespacing=1.5)
 

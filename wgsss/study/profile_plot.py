@@ -10,6 +10,7 @@ import numpy as np
 from wgsss.optics import Photons, Profile
 from wgsss.optics.medium import CHANNELS
 from wgsss.output import replacing
+from wgsss.text import figure_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +51,7 @@ def plot(found: dict[str, Profile], title: str, path: Path) -> None:
         axes[-1, channel].set_xlabel("r, mm")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(handles))
-    figure.suptitle(title, x=0.02, ha="left")
+    figure.suptitle(figure_text(title), x=0.02, ha="left")
     with replacing(path) as (file,):
         figure.savefig(file, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 import base64
 import io
 import json
-import os
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
+from wgsss.folders import appearing
 from wgsss.output import save
 from wgsss.rendering import Image
 from wgsss.study import contact_sheet, error_maps, tables
+from wgsss.study import page as pages
 from wgsss.study.causes import CAUSES, MEANINGS
 from wgsss.study.compare import Comparison
 
@@ -37,9 +35,9 @@ def write_report(comparison: Comparison, folder: Path) -> list[Path]:
     All appear at once, when all are written; files of other names that are in the folder stay.
     Raises InputError where the folder cannot be written.
     """
-    with _appearing(folder) as place:
+    with appearing(folder) as place:
         numbers = {**comparison.json(), "versions": versions()}
-        (place / "metrics.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        (place / "metrics.json").write_text(json.dumps(numbers, indent=2, allow_nan=False) + "\n")
         (place / "report.html").write_text(page(comparison), encoding="utf-8")
         contact_sheet.draw(comparison, place / "contact_sheet.png")
         end = error_maps.top(comparison)
@@ -56,19 +54,13 @@ def write_report(comparison: Comparison, folder: Path) -> list[Path]:
 
 def check_folder(folder: Path) -> Path:
     """The folder, if a report can be written there; to be asked before anything that takes long. Raises InputError."""
-    with _appearing(folder):
+    with appearing(folder):
         return folder
 
 
 def page(comparison: Comparison) -> str:
     """The page as HTML, with everything that it shows inside."""
-    here = Path(__file__).parent
-    text = (here / "report.html").read_text(encoding="utf-8")
-    data = json.dumps(_data(comparison), ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
-    parts = {"STYLE": (here / "report.css").read_text("utf-8"), "SCRIPT": (here / "report.js").read_text("utf-8")}
-    for name, part in {**parts, "DATA": data}.items():
-        text = text.replace(f"/*{name}*/", part)
-    return text
+    return pages.page("report", _data(comparison))
 
 
 def versions() -> dict[str, str]:
@@ -151,25 +143,3 @@ def _png(pixels: Array) -> bytes:
 
 def _uri(pixels: Array) -> str:
     return f"data:image/png;base64,{base64.b64encode(_png(pixels)).decode()}"
-
-
-@contextmanager
-def _appearing(folder: Path) -> Iterator[Path]:
-    """A folder to write to, whose files move to `folder` when the block ends and vanish if it fails."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: this is not a folder")
-    if not folder.resolve().parent.is_dir():
-        raise InputError(f"{folder}: there is no folder '{folder.parent}'")
-    place = folder.resolve().with_name(f".{folder.resolve().name}.{os.getpid()}")
-    try:
-        place.mkdir()
-        yield place
-        files = list(place.iterdir())
-        if files:
-            folder.mkdir(exist_ok=True)
-        for file in files:
-            os.replace(file, folder / file.name)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
-    finally:
-        shutil.rmtree(place, ignore_errors=True)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.errors import InputError
+from wgsss.folders import made
 from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
 from wgsss.output import replacing
@@ -99,10 +99,14 @@ def speedup(
     cell as it is done. Raises InputError where the file cannot be written.
     """
     path = Path(folder) / FILE
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    with made(path.parent):
+        table = _measured(size, tell)
+        with replacing(path) as (file,):
+            file.write_text(json.dumps(table.json(), indent=2) + "\n", encoding="utf-8")
+    return table
+
+
+def _measured(size: tuple[int, int], tell: Callable[[Cell], None]) -> Table:
     map_size = 1 << round(math.log2(size[0] * 2048 / 1920))
     cells: list[Cell] = []
     clock = ""
@@ -119,10 +123,7 @@ def speedup(
         full_ms, seen_ms = np.min(times, axis=0).tolist()
         cells.append(Cell(heads, distance, full_ms, seen_ms, PAPER[row][column]))
         tell(cells[-1])
-    table = Table(size, map_size, default_gpu().name, clock, tuple(cells))
-    with replacing(path) as (file,):
-        file.write_text(json.dumps(table.json(), indent=2) + "\n", encoding="utf-8")
-    return table
+    return Table(size, map_size, default_gpu().name, clock, tuple(cells))
 
 
 def view(heads: int, distance: float) -> Scene:

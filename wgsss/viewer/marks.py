@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wgsss.study.bench import Run
-from wgsss.study.chart import style
+from wgsss.study.chart import LEAST, style
 from wgsss.viewer.trail import Point, label_of, words
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ def session(points: Sequence[Point], methods: Sequence[Method]) -> list[Mark]:
 
 def bench(runs: Sequence[Run]) -> list[Mark]:
     """A bench's runs, each method labelled where it is most accurate."""
-    seen = sorted((run for run in runs if run["error"]["rel_rmse"]), key=lambda run: -run["error"]["rel_rmse"])
+    drawn = (run for run in runs if (run["error"]["rel_rmse"] or 0.0) > LEAST)
+    seen = sorted(drawn, key=lambda run: -run["error"]["rel_rmse"])
     best = {run["method"]: run for run in seen}
     return [
         Mark(
