@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import __version__
+from wgsss.errors import Note
 from wgsss.output import check_output, replacing
 from wgsss.scene import DirectionalLight, Maps, Material, Mesh, OrthographicCamera, PointLight, Scene
 from wgsss.scene.files.gltf_media import VOLUME, VOLUME_SCATTER, written
@@ -42,7 +43,7 @@ def export(scene: Scene, path: str | Path, aspect: float = 1.0) -> Path:
     with replacing(path) as (file,):
         file.write_bytes(data)
     if notes:
-        warnings.warn(f"{scene.name}: the glTF file differs: {'; '.join(notes)}", stacklevel=2)
+        warnings.warn(f"{scene.name}: the glTF file differs: {'; '.join(notes)}", Note, stacklevel=2)
     return path
 
 

@@ -30,7 +30,7 @@ def require_file(path: Path, *, most_bytes: int = MOST_BYTES, may_be_empty: bool
     except ValueError:  # a NUL
         raise InputError(f"{str(path)!r} is not the name of a file") from None
     if kind != stat.S_IFREG:
-        raise InputError(f"{path}: this is {'a folder' if kind == stat.S_IFDIR else 'a device or a pipe'}, not a file")
+        raise InputError(f"{path}: this is {'a folder' if kind == stat.S_IFDIR else 'not a regular file'}")
     if status.st_size > most_bytes:
         raise InputError(f"{path}: {status.st_size} bytes are too many ({most_bytes} at most)")
     if status.st_size == 0 and not may_be_empty:

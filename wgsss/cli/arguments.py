@@ -135,14 +135,14 @@ def table(rows: list[list[str]]) -> str:
 
 def size(text: str) -> tuple[int, int]:
     """WIDTHxHEIGHT in pixels."""
-    from wgsss.scene.checks import MOST_PIXELS
+    from wgsss.scene.images.files import MAX_SIDE
 
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
         raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT, such as 512x512")
     found = int(match[1]), int(match[2])
-    if not all(1 <= side <= MOST_PIXELS for side in found):
-        raise argparse.ArgumentTypeError(f"the image size must be 1 to {MOST_PIXELS} pixels a side, not {text}")
+    if not all(1 <= side <= MAX_SIDE for side in found):
+        raise argparse.ArgumentTypeError(f"the image size must be 1 to {MAX_SIDE} pixels a side, not {text}")
     return found
 
 

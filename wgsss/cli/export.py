@@ -26,8 +26,6 @@ def run(args: Any) -> None:
 
     if args.mitsuba is None and args.gltf is None:
         raise InputError("nothing to write: give --mitsuba DIR, --gltf FILE.glb, or both")
-    if not all(args.size):
-        raise InputError(f"--size must be at least 1x1, not {args.size[0]}x{args.size[1]}")
     if args.gltf is not None:
         check_output(args.gltf, output_gltf.FORMATS)
     scene = arguments.load_scene(args).at(args.time)

@@ -11,14 +11,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from wgsss.errors import InputError
+from wgsss.scene.images.files import MAX_SIDE
 
 Triple = tuple[float, float, float]
 
 # What single precision holds: squares of coordinates, which may have either sign (the sun is 1.5e14 mm away), and all
 # other numbers (its intensity is 3e25 W/sr).
 LARGEST_SIGNED, LARGEST = 1e15, 3e38
-
-MOST_PIXELS = 8192  # of a side of a picture: what every device has textures for
 
 
 def number(owner: object, field: str, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
@@ -61,9 +60,9 @@ def triple(
 
 def image_size(size: tuple[int, int]) -> None:
     """Check the width and height of a picture, in pixels."""
-    if len(size) != 2 or not all(_is_number(n) and int(n) == n and 1 <= n <= MOST_PIXELS for n in size):
+    if len(size) != 2 or not all(_is_number(n) and int(n) == n and 1 <= n <= MAX_SIDE for n in size):
         shown = " x ".join(map(_show, size))
-        raise InputError(f"the image size must be 1 to {MOST_PIXELS} pixels a side, not {shown}")
+        raise InputError(f"the image size must be 1 to {MAX_SIDE} pixels a side, not {shown}")
 
 
 def not_parallel(first: Iterable[float], second: Iterable[float], message: str) -> None:

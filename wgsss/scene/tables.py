@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.errors import InputError, unknown
-from wgsss.scene.images import require_file
+from wgsss.userfiles import require_file
 
 Table = dict[str, Any]
 Parameters = Mapping[str, inspect.Parameter]

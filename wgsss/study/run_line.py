@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from wgsss.errors import InputError
@@ -39,7 +39,7 @@ def _refuse(name: str) -> None:
     raise ValueError(name)
 
 
-def _members(found: Any, keys: dict[str, Check], within: str) -> Run:
+def _members(found: Any, keys: Mapping[str, Check], within: str) -> Run:
     if not isinstance(found, dict):
         raise InputError(f"{f'key {within[:-1]!r}' if within else 'it'} must be an object, not {_shown(found)}")
     for key, check in keys.items():

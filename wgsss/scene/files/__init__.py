@@ -8,7 +8,7 @@ from pathlib import Path
 
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Contents
-from wgsss.scene.images import require_file
+from wgsss.userfiles import require_file
 
 _READERS = {  # file extension -> module of this package, whose function read_<module> reads it
     ".ply": "ply",

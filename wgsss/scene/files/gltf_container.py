@@ -13,7 +13,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from wgsss.errors import InputError
 from wgsss.scene.files.gltf_fields import Item, plain
-from wgsss.scene.images import require_file
+from wgsss.userfiles import require_file
 
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.images.colour import EQUAL_ENERGY, from_primaries, from_xyz, transformed
 from wgsss.scene.images.files import check_size
 from wgsss.scene.images.runs import decoded
@@ -89,7 +89,7 @@ def _header(head: bytes, path: Path) -> Header:
             found = _numbers(name, value, 8)
             primaries = found if found.any() else None  # some writers fill it with zeros
         elif name == b"GAMMA" and (_numbers(name, value, 1, above=0.0) != 1.0).any():
-            warnings.warn(f"{path}: GAMMA={_text(value)} is not applied", stacklevel=2)
+            warnings.warn(f"{path}: GAMMA={_text(value)} is not applied", Note, stacklevel=2)
     if not (np.isfinite(scale).all() and scale.all()):
         raise InputError("EXPOSURE and COLORCORR, all multiplied, are beyond what numbers hold")
     end = head.find(b"\n", at)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
+from wgsss.errors import InputError, Note
 from wgsss.scene.images.pixels import named, read_pixels
 
 Array = npt.NDArray[Any]
@@ -46,7 +46,7 @@ def _finite(pixels: Array, where: str) -> Array:
         raise InputError(f"{where}{bad} pixels are not finite numbers")
     outside = int(((pixels < 0.0) | (pixels > 1.0)).any(axis=2).sum())
     if outside:
-        warnings.warn(f"{where}{outside} pixels outside 0 to 1 are clamped", stacklevel=3)
+        warnings.warn(f"{where}{outside} pixels outside 0 to 1 are clamped", Note, stacklevel=3)
     return np.clip(pixels, 0.0, 1.0)
 
 

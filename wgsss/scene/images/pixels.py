@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.errors import InputError
-from wgsss.scene.images.files import check_size, require_file
+from wgsss.errors import InputError, Note
+from wgsss.scene.images.files import check_size
+from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
@@ -173,7 +174,7 @@ def _unit_range(pixels: Array) -> Array:
     if pixels.dtype.kind == "b":
         return pixels.astype(np.uint8) * 255
     if pixels.min() < 0:
-        warnings.warn("values below 0 in an image of signed integers count as 0", stacklevel=2)
+        warnings.warn("values below 0 in an image of signed integers count as 0", Note, stacklevel=2)
     if pixels.dtype.itemsize == 4 and pixels.max() <= 65535:  # how 16 bits are kept by those who have no such type
         return np.clip(pixels, 0, 65535).astype(np.uint16)
     largest = np.iinfo(pixels.dtype).max

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.scene.images.cube import lat_long_of_cube
 from wgsss.scene.images.exr import read_exr
-from wgsss.scene.images.files import require_file
 from wgsss.scene.images.hdr import read_hdr
+from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
