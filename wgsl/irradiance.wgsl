@@ -4,7 +4,7 @@
 import package::units::{Number, Position, Direction, Irradiance};
 import package::light::{Light, Incident, ShadowView};
 import package::rho_dt::{rho_dt};
-import package::sampling::{lat_long_of_direction};
+import package::sampling::{map_of_direction};
 
 // L_d of one light at x, given the share `lit` of it that shadows leave.
 fn transmitted(at: Incident, n: Direction, specular: Number, lit: Number, rho_dt_table: texture_2d<f32>) -> Irradiance {
@@ -14,5 +14,7 @@ fn transmitted(at: Incident, n: Direction, specular: Number, lit: Number, rho_dt
 
 // L_d of the environment, of which a share `sky` arrives: prefiltered over normals with the cosine and rho_dt.
 fn transmitted_environment(environment: texture_2d<f32>, linear_wrap_u: sampler, n: Direction, sky: Number) -> Irradiance {
-    return sky * textureSampleLevel(environment, linear_wrap_u, lat_long_of_direction(n), 0.0).rgb;
+    let at = map_of_direction(n, textureDimensions(environment));
+    let received = textureSampleLevel(environment, linear_wrap_u, at, 0.0);
+    return sky * received.a * received.rgb;
 }

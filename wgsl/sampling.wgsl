@@ -19,6 +19,19 @@ fn lat_long_of_direction(d: Direction) -> vec2f {
     return vec2f(0.5 + atan2(d.x, -d.z) / (2.0 * PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
 }
 
+// Maps of directions that are smooth: as latitude-longitude maps, but the first and the last row lie on the poles, so
+// that interpolation knows their values.
+fn direction_of_map(texel: vec2u, size: vec2u) -> Direction {
+    let row = f32(texel.y) + select(0.0, 0.5, size.y == 1u);
+    return direction_of_lat_long(vec2f((f32(texel.x) + 0.5) / f32(size.x), row / f32(max(size.y - 1u, 1u))));
+}
+
+// The inverse of direction_of_map, as texture coordinates.
+fn map_of_direction(d: Direction, size: vec2u) -> vec2f {
+    let uv = lat_long_of_direction(d);
+    return vec2f(uv.x, (uv.y * f32(size.y - 1u) + 0.5) / f32(size.y));
+}
+
 // A frame whose last column is n (Duff et al. 2017).
 fn frame_about(n: Direction) -> mat3x3f {
     let s = select(-1.0, 1.0, n.z >= 0.0);

@@ -148,7 +148,7 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
 def _lighting(graph: Graph, stage: Stage) -> SimpleNamespace:
     """Lights and the shadow maps of those that cast shadows."""
     points = _world_points(stage.scene)
-    found = emitters(stage.scene.lights, points)
+    found = emitters(stage.lights, points)
     side = found.shadow_size
     if found.views:
         maps: Any = graph.texture("shadow_maps", (side, side, len(found.views)), "depth32float")

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from wgsss import wgsl
-from wgsss.bake.environment import Prefiltered, prefilter
+from wgsss.bake.environment import Divided, Prefiltered, divided, prefilter
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
 from wgsss.bake.unwrap import Surface, split, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
+from wgsss.scene.light import Light
 from wgsss.scene.material import WRAPS
 
 
@@ -63,9 +64,19 @@ class Stage:
         return [light for light in self.scene.lights if isinstance(light, EnvironmentLight)]
 
     @property
+    def environment(self) -> Divided:
+        """The light of the environments, in two parts."""
+        return self.shared("divided", lambda: divided(self.environments()))
+
+    @property
+    def lights(self) -> list[Light]:
+        """The scene's lights and the suns of its environments. Of these, the other part is not among them."""
+        return [*self.scene.lights, *self.environment.suns]
+
+    @property
     def sky(self) -> float:
-        """The mean radiance of the environments, W/(m^2 sr), of the brightest channel."""
-        return self.shared("sky", lambda: sum(float(e.pixels().mean(axis=(0, 1)).max()) for e in self.environments()))
+        """The mean radiance of the environments without their suns, W/(m^2 sr), of the brightest channel."""
+        return float(self.environment.rest.mean(axis=(0, 1)).max())
 
 
 class Body:
@@ -252,7 +263,7 @@ class Body:
         """The scene's environments as this material receives and reflects them."""
         material = self.material
         key = ("environment", material.roughness, material.eta, material.specular)
-        return self.stage.shared(key, lambda: prefilter(self.stage.gpu, self.stage.environments(), material))
+        return self.stage.shared(key, lambda: prefilter(self.stage.gpu, self.stage.environment.rest, material))
 
 
 _WHITE = np.full((1, 1, 3), 255, np.uint8)

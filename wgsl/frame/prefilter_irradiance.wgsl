@@ -2,10 +2,11 @@
 
 import package::units::{Number, PI};
 import package::rho_dt::{rho_dt};
-import package::sampling::{direction_of_lat_long};
+import package::sampling::{direction_of_lat_long, direction_of_map};
 
 struct Params {
     specular: Number,
+    unit: Number, // what a value of 1 stands for
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -19,7 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let n = direction_of_lat_long((vec2f(id.xy) + 0.5) / vec2f(size));
+    let n = direction_of_map(id.xy, size);
     let source = textureDimensions(environment);
     var total = vec3f(0.0);
     var cosines = 0.0;
@@ -35,5 +36,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     // The cosines' integral is pi; dividing by their sum takes the grid's own error out.
-    textureStore(irradiance, id.xy, vec4f(total * (PI / max(cosines, 1e-9)), 1.0));
+    textureStore(irradiance, id.xy, vec4f(total * (PI / max(cosines, 1e-9)) / params.unit, params.unit));
 }

@@ -2,10 +2,11 @@
 
 import package::units::{Number, PI};
 import package::ggx::{ggx_distribution};
-import package::sampling::{direction_of_lat_long};
+import package::sampling::{direction_of_lat_long, direction_of_map};
 
 struct Params {
     alpha: Number,
+    unit: Number, // what a value of 1 stands for
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -18,7 +19,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let r = direction_of_lat_long((vec2f(id.xy) + 0.5) / vec2f(size));
+    let r = direction_of_map(id.xy, size);
     let source = textureDimensions(environment);
     // A lobe narrower than a source texel would fall between texels.
     let alpha = max(params.alpha, 2.0 / f32(source.y));
@@ -36,5 +37,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    textureStore(reflection, id.xy, vec4f(total / max(weights, 1e-9), 1.0));
+    textureStore(reflection, id.xy, vec4f(total / max(weights, 1e-9) / params.unit, params.unit));
 }

@@ -5,7 +5,7 @@ import package::mesh::{Surface};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::ggx::{ggx_brdf};
 import package::rho_dt::{rho_dt};
-import package::sampling::{lat_long_of_direction};
+import package::sampling::{map_of_direction};
 import package::screen::{position_of_pixel, direction_to_eye};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
@@ -53,8 +53,9 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let w_o = direction_to_eye(params.eye, x);
     // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance. The share of the
     // sky that is hidden is that of the whole hemisphere, not of the lobe.
-    let mirrored = textureSampleLevel(reflection, linear_wrap_u, lat_long_of_direction(reflect(-w_o, n)), 0.0).rgb;
-    var total = seen.w * mirrored * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
+    let towards = map_of_direction(reflect(-w_o, n), textureDimensions(reflection));
+    let mirrored = textureSampleLevel(reflection, linear_wrap_u, towards, 0.0);
+    var total = seen.w * mirrored.a * mirrored.rgb * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);

@@ -10,32 +10,40 @@ import numpy.typing as npt
 
 from wgsss.bake import rays
 from wgsss.bake.cache import cached
-from wgsss.bake.environment import summed
+from wgsss.bake.environment import divided
+from wgsss.bake.suns import solid_angles
 from wgsss.scene import EnvironmentLight, Scene
 
 Array = npt.NDArray[Any]
 
 DIRECTIONS = 256
-"""rays from each point"""
+"""rays from each point; as many more towards the bright parts of an image"""
 _LIFT = 1e-4  # of the scene's extent: how far above the surface rays start
+_EVEN = 1e-3  # of the mean radiance, added to an image: what is seen of a sky that is black from here is its share, too
 _BLOCK = 4096  # points whose rays are cast at a time
 
 
 def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: Array, normals: Array) -> Array:
     """The share (N,) of the environments' irradiance that arrives at points in the world, 0 to 1, float32, cached.
 
-    `positions` (N, 3) in mm and `normals` (N, 3) of length 1. By rays through the scene at rest, spread by the cosine
-    and weighted by the environments' mean over the channels: what of rho_dt depends on direction is left out.
+    `positions` (N, 3) in mm and `normals` (N, 3) of length 1. By rays through the scene at rest, weighted by the
+    environments' mean over the channels: what of rho_dt depends on direction is left out, and so are suns, which are
+    lights (`wgsss.bake.suns`). Rays are spread by the cosine, and of images as many again by their radiance; the two
+    are combined by the balance heuristic (Veach & Guibas 1995, "Optimally combining sampling techniques").
     """
+    pixels = divided(lights).rest
+    if not pixels.any():
+        return np.ones(len(positions), np.float32)
     vertices, faces = _triangles(scene)
-    pixels = summed(lights)
+    even = bool((pixels == pixels[0, 0]).all())
+    sky = pixels[0, 0].mean() if even else _Image(pixels)
 
     def make() -> dict[str, Array]:
         caster = rays.Caster(vertices, faces)
         lift = _LIFT * float(np.ptp(vertices, axis=0).max())
         blocks = range(0, len(positions), _BLOCK)
         parts = [
-            _visible(caster, pixels, positions[i : i + _BLOCK], normals[i : i + _BLOCK], lift, first=i) for i in blocks
+            _visible(caster, sky, positions[i : i + _BLOCK], normals[i : i + _BLOCK], lift, first=i) for i in blocks
         ]
         return {"visible": np.concatenate(parts)}
 
@@ -53,13 +61,23 @@ def _triangles(scene: Scene) -> tuple[Array, Array]:
     return np.concatenate(vertices).astype(np.float64), np.concatenate(faces)
 
 
-def _visible(caster: rays.Caster, pixels: Array, x: Array, n: Array, lift: float, first: int) -> Array:
+def _visible(caster: rays.Caster, sky: _Image | np.float32, x: Array, n: Array, lift: float, first: int) -> Array:
     """The share (N,) at points of which the first has the number `first`, which turns its directions."""
-    w = _about(n.astype(np.float64), _golden(np.arange(first, first + len(x))))
-    origins = np.repeat(x + lift * n, DIRECTIONS, axis=0)
-    free = ~caster.blocked(origins, w.reshape(-1, 3)).reshape(len(x), DIRECTIONS)
-    radiance = _seen(pixels, w)
-    return ((free * radiance).sum(axis=1) / np.maximum(radiance.sum(axis=1), 1e-30)).astype(np.float32)
+    n = n.astype(np.float64)
+    w = _about(n, _golden(np.arange(first, first + len(x))))
+    origins = x + lift * n
+    if not isinstance(sky, _Image):
+        weight = np.full(w.shape[:2], sky)
+    else:
+        w = np.concatenate([w, np.broadcast_to(sky.directions, (len(x), *sky.directions.shape))], axis=1)
+        cosine = np.maximum((w * n[:, None]).sum(axis=-1), 0.0)
+        radiance = sky.radiance(w)
+        density = DIRECTIONS * (cosine / np.pi + radiance / sky.total)
+        weight = radiance * cosine / np.maximum(density, 1e-30)
+    cast = weight > 0.0
+    free = np.zeros(cast.shape, bool)
+    free[cast] = ~caster.blocked(np.repeat(origins, cast.sum(axis=1), axis=0), w[cast])
+    return ((free * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-30)).astype(np.float32)
 
 
 def _golden(numbers: Array) -> Array:
@@ -80,9 +98,44 @@ def _about(n: Array, turn: Array) -> Array:
     return across + np.sqrt(1.0 - sine**2)[:, None] * n[:, None]
 
 
-def _seen(pixels: Array, w: Array) -> Array:
-    """The mean over the channels of the environment's radiance (...) in directions w (..., 3)."""
-    height, width = pixels.shape[:2]
-    column = (0.5 + np.arctan2(w[..., 0], -w[..., 2]) / (2.0 * np.pi)) * width
-    row = np.arccos(np.clip(w[..., 1], -1.0, 1.0)) / np.pi * height
-    return pixels.mean(axis=2)[np.minimum(row.astype(int), height - 1), column.astype(int) % width]
+class _Image:
+    """A latitude-longitude image of the sky (H, W, 3), by its mean over the channels.
+
+    Attributes:
+        total: its integral over all directions.
+        directions: (DIRECTIONS, 3), as dense as the radiance, the same for all points: shadows of neighbours are alike.
+    """
+
+    def __init__(self, pixels: Array) -> None:
+        height, width = pixels.shape[:2]
+        grey = pixels.mean(axis=2).astype(np.float64)
+        weight = solid_angles(height, width)[:, None]
+        self._grey = grey + _EVEN * float((grey * weight).sum()) / (4.0 * np.pi)
+        power = self._grey * weight
+        self.total = float(power.sum())
+        rows, columns = np.cumsum(power.sum(axis=1)), np.cumsum(power, axis=1)
+        i = np.arange(DIRECTIONS)
+        down = (i + 0.5) / DIRECTIONS * rows[-1]
+        row = np.searchsorted(rows, down)
+        across = _radical_inverse(i) * columns[row, -1]
+        column = np.array([np.searchsorted(columns[r], a, side="right") for r, a in zip(row, across, strict=True)])
+        # Within a texel evenly, too, in the cosine of latitude and in longitude.
+        part = (rows[row] - down) / power[row].sum(axis=1)
+        low, high = np.cos(np.pi * (row + 1) / height), np.cos(np.pi * row / height)
+        y = low + part * (high - low)
+        phi = 2.0 * np.pi * ((column + 1 - (columns[row, column] - across) / power[row, column]) / width - 0.5)
+        ring = np.sqrt(np.maximum(1.0 - y * y, 0.0))
+        self.directions = np.stack([ring * np.sin(phi), y, -ring * np.cos(phi)], axis=1)  # see EnvironmentLight
+
+    def radiance(self, w: Array) -> Array:
+        """In directions w (..., 3), shape (...)."""
+        height, width = self._grey.shape
+        column = (0.5 + np.arctan2(w[..., 0], -w[..., 2]) / (2.0 * np.pi)) * width
+        row = np.arccos(np.clip(w[..., 1], -1.0, 1.0)) / np.pi * height
+        return self._grey[np.minimum(row.astype(int), height - 1), column.astype(int) % width]
+
+
+def _radical_inverse(i: Array) -> Array:
+    """In base 2: the second coordinate of the Hammersley set."""
+    bits = (i[:, None] >> np.arange(32)) & 1
+    return bits @ 0.5 ** np.arange(1, 33)

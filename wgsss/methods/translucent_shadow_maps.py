@@ -31,7 +31,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from wgsss.bake.environment import prefilter
+from wgsss.bake.environment import NO_SKY, prefilter
 from wgsss.emitters import emitters
 from wgsss.frame import Frame, rectangle
 from wgsss.graph import Handle
@@ -69,7 +69,7 @@ class TranslucentShadowMaps:
 def _lights(frame: Frame) -> Iterator[tuple[Source, list[dict[str, Any]]]]:
     """The lights that are not dark, but for the sky, each with its share of `lighting.lights`."""
     first = 0
-    for light in frame.stage.scene.lights:
+    for light in frame.stage.lights:
         if isinstance(light, EnvironmentLight):
             continue
         emitted = frame.lighting.lights[first : first + getattr(light, "samples", 1)]
@@ -158,5 +158,5 @@ def _lit_by(frame: Frame, emitted: list[dict[str, Any]]) -> Frame:
 def _without_sky(body: Body) -> Body:
     """The body where there is no environment."""
     dark = copy(body)
-    dark.environment = body.stage.shared("no sky", lambda: prefilter(body.stage.gpu, [], body.material))
+    dark.environment = body.stage.shared("no sky", lambda: prefilter(body.stage.gpu, NO_SKY, body.material))
     return dark
