@@ -1,0 +1,69 @@
+"""The materials of OBJ files: which .mtl files are named, and which of their materials each face has."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.errors import InputError
+from wgsss.scene.files.contents import Look
+from wgsss.scene.files.locate import locate
+from wgsss.scene.files.mtl import read_materials
+from wgsss.scene.files.text import Text, shown, without_comment
+
+Array = npt.NDArray[Any]
+
+
+def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: list[str]) -> tuple[list[Look], Array]:
+    """Looks, and which of them each face has (F,), given the rows of mtllib, usemtl and faces.
+
+    A material that no .mtl file has is a look without properties, which a note names, as one does a missing file.
+    """
+    looks: dict[str, Look] = {}
+    for row in libraries:
+        for file in _files(text.rest(row), text.path.parent, notes):
+            try:
+                found, more = read_materials(file)
+            except InputError as error:
+                notes.append(f"materials left out: {error}")
+                continue
+            looks = {**found, **looks}  # of two with one name the first counts
+            notes += more
+    by_short_name = {without_comment(name): look for name, look in looks.items()}
+
+    names = [text.rest(row) for row in uses]
+    number: dict[str, int] = {}
+    result, unknown = [Look()], []
+    for name in dict.fromkeys(names):
+        look = looks.get(name) or by_short_name.get(without_comment(name))
+        if look is None:
+            unknown.append(shown(name))
+        number[name] = len(result)
+        result.append(look or Look(without_comment(name)))
+    if unknown:
+        listed = ", ".join(unknown[:3]) + (f" and {len(unknown) - 3} more" if len(unknown) > 3 else "")
+        notes.append(f"no .mtl file describes material{'s' * (len(unknown) > 1)} {listed}")
+    of_use = np.array([0, *(number[name] for name in names)])
+    return result, of_use[np.searchsorted(uses, faces)]
+
+
+def _files(names: str, folder: Path, notes: list[str]) -> list[Path]:
+    """The files that a mtllib statement names: one, whose name may hold blanks, or several."""
+    for whole in (names, without_comment(names)):
+        file = locate(whole.strip('"'), folder)
+        if file:
+            return [file]
+    names = without_comment(names)
+    several = re.split(r"(?<=\.mtl)\s+", names, flags=re.IGNORECASE) if ".mtl" in names.lower() else names.split()
+    files = []
+    for name in several:
+        file = locate(name.strip('"'), folder)
+        if file:
+            files.append(file)
+        else:
+            notes.append(f"the material file '{shown(name)}' is not there")
+    return files
