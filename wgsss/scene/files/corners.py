@@ -39,16 +39,21 @@ def upside_down(uvs: Array) -> Array:
 
 
 def finite_uvs(uvs: Array, notes: list[str]) -> Array:
-    """Texture coordinates (N, 2) with 0 for those that are not finite, which a note counts."""
-    finite = np.isfinite(uvs).all(axis=1, keepdims=True)
+    """Texture coordinates (N, 2) with 0 for those that are not finite as float32, which a note counts."""
+    finite = _finite(uvs)
     if not finite.all():
         notes.append(f"{np.count_nonzero(~finite)} texture coordinates are not finite numbers: 0 is taken for them")
     return np.where(finite, uvs, 0.0)
 
 
 def finite_normals(normals: Array, notes: list[str]) -> Array:
-    """Normals (N, 3) with 0, for none, where they are not finite, which a note counts."""
-    finite = np.isfinite(normals).all(axis=1, keepdims=True)
+    """Normals (N, 3) with 0, for none, where they are not finite as float32, which a note counts."""
+    finite = _finite(normals)
     if not finite.all():
         notes.append(f"{np.count_nonzero(~finite)} normals are not finite numbers and are left out")
     return np.where(finite, normals, 0.0)
+
+
+def _finite(values: Array) -> Array:
+    with np.errstate(over="ignore"):
+        return np.isfinite(values.astype(np.float32)).all(axis=1, keepdims=True)

@@ -7,6 +7,7 @@ physically-based materials (norm, Pr, Pm). Colours are taken to be linear, as Bl
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def read_materials(path: Path) -> tuple[dict[str, Look], list[str]]:
     notes = _Notes()
     materials: dict[str, _Material] = {}
     current = _Material("", path.parent, notes)
-    for line in decoded(data).removeprefix("\ufeff").splitlines():
+    for line in re.split(r"\r\n|\r|\n", decoded(data).removeprefix("\ufeff")):
         keyword, *rest = line.split(maxsplit=1) or [""]
         value = rest[0].strip() if rest else ""
         if keyword.lower() == "newmtl":
@@ -55,13 +56,13 @@ class _Notes:
     """Notes on materials: one line for each kind, whatever the number of materials."""
 
     def __init__(self) -> None:
-        self._materials: dict[str, list[str]] = {}
+        self._materials: dict[str, dict[str, None]] = {}
 
     def add(self, material: str, what: str) -> None:
-        self._materials.setdefault(what, []).append(material)
+        self._materials.setdefault(what, {})[material] = None
 
     def lines(self) -> list[str]:
-        return [f"{_listed(materials)}: {what}" for what, materials in self._materials.items()]
+        return [f"{_listed(list(materials))}: {what}" for what, materials in self._materials.items()]
 
 
 def _listed(materials: list[str]) -> str:

@@ -74,7 +74,7 @@ def read_obj(path: Path) -> Contents:
     looks, look_of_face = read_looks(text, rows[b"mtllib"], rows[b"usemtl"], face_rows, notes)
     faces = _whole_uvs(faces, look_of_face, notes)
     parts = []
-    for i in np.unique(look_of_face[face]):
+    for i in np.flatnonzero(np.bincount(look_of_face[face])):
         corners = triangles[look_of_face[face] == i].ravel()
         parts.append(_part(looks[i], faces, corners, values))
     splits = len(parts) > 1 or any(part.uvs or part.normals is not None for part in parts)

@@ -22,7 +22,7 @@ from wgsss.scene.files.triangulate import triangulate
 
 Array = npt.NDArray[Any]
 
-_KEYWORD = re.compile(rb"(?P<uvs>ST)?(?P<colors>C)?(?P<normals>N)?(?P<dimensions>4?n?)OFF")
+_KEYWORD = re.compile(rb"(?P<uvs>ST)?(?P<colors>C)?(?P<normals>N)?(?P<dimensions>4?n?)(?:OFF|off)")
 
 
 def read_off(path: Path) -> Contents:
@@ -38,6 +38,8 @@ def read_off(path: Path) -> Contents:
     if not len(text.starts):
         raise InputError(f"{path}: the file is empty")
     keyword = _KEYWORD.fullmatch(text.word(0))  # which is optional
+    if keyword is None and not text.word(0).isdigit():
+        raise InputError(f"{path}: damaged, or not an .off file: its first word is neither 'OFF' nor a number")
     if keyword and keyword["dimensions"]:
         raise InputError(f"{path}: OFF files of more than three dimensions are not supported")
     row = int(keyword is not None and text.widths[0] == 1)

@@ -76,7 +76,8 @@ def _taken(table: Table, names: tuple[str, ...]) -> Array | None:
         return None
     for name in names:
         del table[name]
-    return np.stack(columns, axis=1).astype(np.float64)  # type: ignore[arg-type]
+    with np.errstate(invalid="ignore"):  # numbers that are not finite are the caller's to find
+        return np.stack(columns, axis=1).astype(np.float64)  # type: ignore[arg-type]
 
 
 def _colors(element: Element, vertices: Table, notes: list[str]) -> Array | None:

@@ -41,7 +41,7 @@ def read_faces(path: Path, tables: dict[str, Table], vertices: int, notes: list[
     """
     table, strips = tables.get("face", tables.get("faces", {})), tables.get("tristrips", {})
     corner_uvs = _taken(table, _CORNER_UVS)
-    polygons = _taken(table, _INDICES) or _taken(table, [name for name in table if isinstance(table[name], Lists)])
+    polygons = _taken(table, _INDICES) or _taken(table, [name for name in table if _is_whole(table[name])])
     strip = _taken(strips, _INDICES)
 
     counts, vertex = np.empty(0, np.int64), np.empty(0, np.int64)
@@ -68,6 +68,11 @@ def _taken(table: Table, names: Iterable[str]) -> Lists | None:
             del table[name]
             return value
     return None
+
+
+def _is_whole(values: Array | Lists) -> bool:
+    """Whether these are lists of whole numbers: those of the vertices may have any name."""
+    return isinstance(values, Lists) and bool((values.values == np.floor(values.values)).all())
 
 
 def _whole(values: Array) -> Array:

@@ -54,7 +54,9 @@ def _binary(path: Path, data: bytes, count: int, notes: list[str]) -> tuple[Arra
     colored = np.count_nonzero(facets["attribute"])
     if colored or b"COLOR=" in data[:80]:
         notes.append(f"colours (attributes) of {colored} facets are left out" if colored else "the colour is left out")
-    return facets["corners"].reshape(-1, 3).astype(np.float64), np.arange(3 * count).reshape(-1, 3)
+    with np.errstate(invalid="ignore"):  # positions that are not finite are the caller's to find
+        positions = facets["corners"].reshape(-1, 3).astype(np.float64)
+    return positions, np.arange(3 * count).reshape(-1, 3)
 
 
 def _ascii(path: Path, data: bytes, notes: list[str]) -> tuple[Array, Array]:

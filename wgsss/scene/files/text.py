@@ -73,7 +73,8 @@ class Text:
         change = np.flatnonzero(space[1:] != space[:-1])
         self.starts, self.ends = change[::2], change[1::2]
         breaks = np.flatnonzero(self.codes == 10)
-        first = np.unique(np.concatenate([[0], np.searchsorted(self.starts, breaks), [len(self.starts)]]))
+        edges = np.concatenate([[0], np.searchsorted(self.starts, breaks), [len(self.starts)]])
+        first = edges[np.concatenate([[True], edges[1:] != edges[:-1]])]
         self.first = first
         """int64 (R + 1,): the first word of each row, and the number of words"""
         self.widths = np.diff(first)
