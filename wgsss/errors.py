@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LONGEST = 60  # characters of a name in a message
+
 
 class InputError(ValueError):
     """Bad input. Its message is one line that says what is wrong and where; commands print it and exit with 2."""
@@ -20,6 +22,7 @@ class Note(UserWarning):
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """An error for a name that is not among those known, suggesting the nearest one."""
+    name = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3]}..."
     known = sorted(known)
     near = difflib.get_close_matches(name.lower(), [k.lower() for k in known], n=1, cutoff=0.5)
     hint = next((f"; did you mean '{k}'?" for k in known if near and k.lower() == near[0]), "")

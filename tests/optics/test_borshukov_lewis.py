@@ -100,10 +100,10 @@ def test_channels_are_independent(profile, skin):
 @pytest.mark.parametrize(
     ("albedo", "k", "c", "says"),
     [
-        ((0.5, -1, 0.5), K, C, "albedo of green must be at least 0, not -1"),
-        (T, (3, 3, 2), C, "k of blue must be above 2, not 2"),
-        (T, (np.nan, 3, 3), C, "k of red must be above 2, not nan"),
-        (T, K, (0, 1, 1), r"c of red must be above 0 \(mm\), not 0"),
+        ((0.5, -1, 0.5), K, C, "albedo of green must be from 0 to 100, not -1"),
+        (T, (3, 3, 2), C, "k of blue must be above 2 and at most 10000, not 2"),
+        (T, (np.nan, 3, 3), C, "k of red must be above 2 .*, not nan"),
+        (T, K, (0, 1, 1), r"c of red must be above 0 and at most 1e\+12 \(mm\), not 0"),
         (T, K, (1, np.inf, 1), "c of green must be above 0"),
         (T, 3.0, C, "k must be three numbers"),
     ],

@@ -88,11 +88,11 @@ def test_black_reflects_nothing():
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (((0.5, 1.1, 0.5), (1, 1, 1)), "albedo of green must be at most 1, not 1.1"),
-        (((0.5, -0.1, 0.5), (1, 1, 1)), "albedo of green must be at least 0, not -0.1"),
+        (((0.5, 1.1, 0.5), (1, 1, 1)), "albedo of green must be from 0 to 1, not 1.1"),
+        (((0.5, -0.1, 0.5), (1, 1, 1)), "albedo of green must be from 0 to 1, not -0.1"),
         (((0.5, np.nan, 0.5), (1, 1, 1)), "albedo of green"),
         ((0.5, (1, 1, 1)), "albedo must be three numbers"),
-        (((0.5, 0.5, 0.5), (1, 1, 0)), r"of blue must be above 0 \(mm\), not 0"),
+        (((0.5, 0.5, 0.5), (1, 1, 0)), r"of blue must be above 0 and at most 1e\+12 \(mm\), not 0"),
         (((0.5, 0.5, 0.5), (1, np.inf, 1)), "of green must be above 0"),
     ],
 )

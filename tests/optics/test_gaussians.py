@@ -112,8 +112,8 @@ def test_bad_distances_are_told():
         ([[1.0, 1.0, 0.0]], np.ones((1, 3)), "positive"),
         ([0.0, 1.0], np.ones((2, 3)), "positive"),
         ([np.nan], np.ones((1, 3)), "positive"),
-        ([1.0], [[1.0, -0.1, 1.0]], "not negative"),
-        ([1.0], [[1.0, np.inf, 1.0]], "finite"),
+        ([1.0], [[1.0, -0.1, 1.0]], "must not be negative"),
+        ([1.0], [[1.0, np.inf, 1.0]], "sum to 100 at most"),
     ],
 )
 def test_bad_input_is_told(variances, weights, says):

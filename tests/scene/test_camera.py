@@ -77,17 +77,25 @@ def test_turning_goes_about_up_through_the_target(kind: type) -> None:
         (PerspectiveCamera, {"eye": (0, 0, 0), "target": (0, 0, 0)}, "eye and target must not be the same point"),
         (PerspectiveCamera, {"eye": (0, 9, 0), "target": (0, 0, 0)}, "up must not be parallel"),
         (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "up": (0, 0, 0)}, "up must not be the zero vector"),
-        (PerspectiveCamera, {"eye": (0, 0, math.nan), "target": (0, 0, 0)}, "eye must be three numbers, each finite"),
+        (
+            PerspectiveCamera,
+            {"eye": (0, 0, math.nan), "target": (0, 0, 0)},
+            "eye must be three numbers, each from -1e\\+15 to 1e\\+15 \\(mm\\), not \\(0, 0, nan\\)",
+        ),
         (
             PerspectiveCamera,
             {"eye": (0, 0, 1), "target": (0, 0, 0), "fov": 0.01},
-            "fov must be from 0.05 to 170, not 0.01",
+            "fov must be from 0.05 to 170 \\(degrees\\), not 0.01",
         ),
-        (PerspectiveCamera, {"eye": (0, 0, 1), "target": (0, 0, 0), "turn": math.inf}, "turn must be a finite number"),
+        (
+            PerspectiveCamera,
+            {"eye": (0, 0, 1), "target": (0, 0, 0), "turn": math.inf},
+            "turn must be from -1e\\+09 to 1e\\+09 \\(degrees per second\\), not inf",
+        ),
         (
             OrthographicCamera,
             {"eye": (0, 0, 1), "target": (0, 0, 0), "height": 0},
-            "height must be at least 1e-06, not 0",
+            "height must be from 1e-06 to 1e\\+13 \\(mm\\), not 0",
         ),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wgsss.optics.medium import coefficients
+from wgsss.optics.medium import FARTHEST, MOST_TOTAL, coefficients
 from wgsss.optics.profile import Profile, distances
 from wgsss.optics.samples import DISTANCES, MEASURE, levelled, root_energy, scale
 
@@ -31,9 +31,9 @@ class BorshukovLewis(Profile):
     c: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "albedo", coefficients("albedo", self.albedo, 0.0, False))
-        object.__setattr__(self, "k", coefficients("k", self.k, 2.0, True))
-        object.__setattr__(self, "c", coefficients("c", self.c, 0.0, True, "mm"))
+        object.__setattr__(self, "albedo", coefficients("albedo", self.albedo, 0.0, MOST_TOTAL))
+        object.__setattr__(self, "k", coefficients("k", self.k, 2.0, 1e4, above=True))
+        object.__setattr__(self, "c", coefficients("c", self.c, 0.0, FARTHEST, "mm", above=True))
 
     @classmethod
     def fit(cls, profile: Profile) -> Self:

@@ -8,8 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wgsss.errors import InputError
-from wgsss.optics.medium import CHANNELS, coefficients
+from wgsss.optics.medium import FARTHEST, coefficients
 from wgsss.optics.profile import Profile, distances
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ class NormalizedDiffusion(Profile):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "albedo", _albedo(self.albedo))
-        object.__setattr__(self, "d", coefficients("d", self.d, 0.0, True, "mm"))
+        object.__setattr__(self, "d", coefficients("d", self.d, 0.0, FARTHEST, "mm", above=True))
 
     @classmethod
     def searchlight(cls, albedo: ArrayLike, mean_free_path: ArrayLike) -> Self:
@@ -38,7 +37,7 @@ class NormalizedDiffusion(Profile):
 
         `mean_free_path` (3,) in mm: of the volume below, 1 / sigma_t', whose surface albedo is A.
         """
-        A, length = _albedo(albedo), coefficients("mean_free_path", mean_free_path, 0.0, True, "mm")
+        A, length = _albedo(albedo), coefficients("mean_free_path", mean_free_path, 0.0, FARTHEST, "mm", above=True)
         return cls(A, length / (1.85 - A + 7.0 * np.abs(A - 0.8) ** 3))
 
     @classmethod
@@ -47,14 +46,14 @@ class NormalizedDiffusion(Profile):
 
         `mean_free_path` (3,) in mm: of the volume below, 1 / sigma_t', whose surface albedo is A.
         """
-        A, length = _albedo(albedo), coefficients("mean_free_path", mean_free_path, 0.0, True, "mm")
+        A, length = _albedo(albedo), coefficients("mean_free_path", mean_free_path, 0.0, FARTHEST, "mm", above=True)
         return cls(A, length / (1.9 - A + 3.5 * np.square(A - 0.8)))
 
     @classmethod
     def from_diffuse_mean_free_path(cls, albedo: ArrayLike, diffuse_mean_free_path: ArrayLike) -> Self:
         """For a narrow beam, from the diffuse mean free path 1 / sigma_tr (3,) in mm: s = 3.5 + 100 (A - 0.33)^4."""
         A = _albedo(albedo)
-        length = coefficients("diffuse_mean_free_path", diffuse_mean_free_path, 0.0, True, "mm")
+        length = coefficients("diffuse_mean_free_path", diffuse_mean_free_path, 0.0, FARTHEST, "mm", above=True)
         return cls(A, length / (3.5 + 100.0 * (A - 0.33) ** 4))
 
     @property
@@ -81,8 +80,4 @@ class NormalizedDiffusion(Profile):
 
 
 def _albedo(values: ArrayLike) -> Array:
-    A = coefficients("albedo", values, 0.0, False)
-    for channel, value in zip(CHANNELS, A.tolist(), strict=True):
-        if value > 1.0:
-            raise InputError(f"albedo of {channel} must be at most 1, not {value:g}")
-    return A
+    return coefficients("albedo", values, 0.0, 1.0)

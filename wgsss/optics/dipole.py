@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
 from wgsss.optics import fresnel, sources
-from wgsss.optics.medium import CHANNELS, Medium, coefficients
+from wgsss.optics.medium import CHANNELS, DENSEST, LONGEST, SHORTEST, THINNEST, Medium, coefficients
 from wgsss.optics.profile import Profile, distances, shares
+from wgsss.values import span
 
 Array = NDArray[np.float64]
 Term = Callable[..., Array]
@@ -65,21 +66,27 @@ class Dipole(Medium, Profile):
 
         if length.keys() not in ({"mean_free_path"}, {"diffuse_mean_free_path"}):
             raise InputError("give mean_free_path or diffuse_mean_free_path, one of them")
-        wanted = coefficients("reflectance", reflectance, 0.0, True)
+        wanted = coefficients("reflectance", reflectance, 0.0, 1.0, above=True)
         ((name, value),) = length.items()
-        scale = coefficients(name, value, 0.0, True, "mm")
+        scale = coefficients(name, value, SHORTEST, LONGEST, "mm")
 
         def unit(albedo: float) -> Dipole:  # a mean free path of 1 mm
             return cls(np.full(3, 1.0 - albedo), np.full(3, albedo), eta)
 
         least, most = 1e-9, 1.0 - 1e-12
+        low, high = unit(least).total[0], unit(most).total[0]
         albedo = np.empty(3)
         for i, R in enumerate(wanted):
-            if not unit(least).total[0] < R < unit(most).total[0]:
-                raise InputError(f"reflectance of {CHANNELS[i]} must be below {unit(most).total[0]:.4g}, not {R:g}")
+            if not low < R < high:
+                bounds = f"above {low:.2g} and below {high:.4g}"
+                raise InputError(f"reflectance of {CHANNELS[i]} must be {bounds}, not {R:g}")
             albedo[i] = brentq(lambda a, R=R: unit(a).total[0] - R, least, most, xtol=1e-15, rtol=1e-14)
         if name == "diffuse_mean_free_path":
             scale = scale * np.array([unit(a).sigma_tr[0] for a in albedo])
+        for i, sigma in enumerate(albedo / scale):
+            if not THINNEST <= sigma <= DENSEST:
+                found = f"sigma_s' would be {sigma:.3g}, and must be {span(THINNEST, DENSEST, unit='1/mm')}"
+                raise InputError(f"{name} of {CHANNELS[i]} does not go with its reflectance: {found}")
         return cls((1.0 - albedo) / scale, albedo / scale, eta)
 
 

@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
+from wgsss.optics.medium import MOST_TOTAL
 from wgsss.optics.profile import Profile, distances, shares
+from wgsss.values import array_of, shown, span
 
 Array = NDArray[np.float64]
+
+_NARROWEST, _WIDEST = 1e-18, 1e18  # mm^2: of variances
 
 _erf = np.vectorize(math.erf, otypes=[np.float64])
 
@@ -30,8 +34,10 @@ class SumOfGaussians(Profile):
     weights: Array
 
     def __post_init__(self) -> None:
-        variances = np.array(self.variances, dtype=np.float64)
-        weights = np.array(self.weights, dtype=np.float64)
+        try:
+            variances, weights = array_of(self.variances), array_of(self.weights)
+        except ValueError:
+            raise InputError("variances and weights of a sum of Gaussians must be numbers, in rows of 3") from None
         shaped = weights.shape[1:] == (3,) and variances.shape in (weights.shape[:1], weights.shape)
         if not shaped or weights.size == 0:
             raise InputError(
@@ -40,10 +46,13 @@ class SumOfGaussians(Profile):
             )
         steps = np.diff(variances, axis=0)
         ascending = np.all(steps > 0 if variances.ndim == 1 else steps >= 0)
-        if not (np.all(np.isfinite(variances)) and np.all(variances > 0) and ascending):
-            raise InputError(f"variances must be positive and ascending (mm^2), not {variances.tolist()}")
-        if not (np.all(np.isfinite(weights)) and np.all(weights >= 0)):
-            raise InputError(f"weights must be finite and not negative, not {weights.tolist()}")
+        if not (np.all((variances >= _NARROWEST) & (variances <= _WIDEST)) and ascending):
+            wanted = f"positive and ascending, {span(_NARROWEST, _WIDEST, unit='mm^2')}"
+            raise InputError(f"variances must be {wanted}, not {shown(variances.tolist())}")
+        if not (np.all(weights >= 0) and np.all(weights.sum(axis=0) <= MOST_TOTAL)):
+            raise InputError(
+                f"weights must not be negative, and sum to {MOST_TOTAL:g} at most, not {shown(weights.tolist())}"
+            )
         variances.flags.writeable = weights.flags.writeable = False
         object.__setattr__(self, "variances", variances)
         object.__setattr__(self, "weights", weights)

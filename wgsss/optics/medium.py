@@ -10,10 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss.errors import InputError
+from wgsss.values import array_of, is_number, shown, span
 
 Array = NDArray[np.float64]
 
 CHANNELS = ("red", "green", "blue")
+
+THINNEST, DENSEST = 1e-6, 1e6
+"""1/mm: of the coefficients of materials; models may need less scattering, but no medium has more"""
+SHORTEST, LONGEST = 1e-6, 1e6
+"""mm: of lengths in media"""
+FARTHEST = 1e12
+"""mm: of lengths that follow from others"""
+MOST_TOTAL = 100.0
+"""of the light that a profile gives back in all: no medium more than 1, but tables and fits may be off"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +39,9 @@ class Medium:
     eta: float = 1.3
 
     def __post_init__(self) -> None:
-        for name, low, above in (("sigma_a", 0.0, False), ("sigma_s_prime", 0.0, True)):
-            object.__setattr__(self, name, coefficients(name, getattr(self, name), low, above, "1/mm"))
+        for name, above in (("sigma_a", False), ("sigma_s_prime", True)):
+            values = coefficients(name, getattr(self, name), 0.0, 1e12, "1/mm", above=above)
+            object.__setattr__(self, name, values)
         check_index("eta", self.eta)
 
     @property
@@ -78,10 +89,10 @@ class Layer(Medium):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.thickness > 0.0:
-            raise InputError(f"thickness must be above 0 (mm), not {self.thickness}")
-        if not -1.0 < self.g < 1.0:
-            raise InputError(f"g must be above -1 and below 1, not {self.g}")
+        if self.thickness != math.inf and not (is_number(self.thickness) and 0.0 < self.thickness <= LONGEST):
+            raise InputError(f"thickness must be {span(0.0, LONGEST, True, 'mm')}, or inf, not {shown(self.thickness)}")
+        if not (is_number(self.g) and -1.0 < self.g < 1.0):
+            raise InputError(f"g must be a number above -1 and below 1, not {shown(self.g)}")
 
     @property
     def sigma_s(self) -> Array:
@@ -104,23 +115,21 @@ def stack(layers: Sequence[Layer]) -> tuple[Layer, ...]:
 
 def check_index(name: str, eta: object) -> None:
     """Raises InputError unless a refractive index relative to air is one that the polynomials of `fresnel` cover."""
-    if not (isinstance(eta, int | float | np.number) and 1.0 <= float(eta) <= 3.0):
-        raise InputError(f"{name} must be a number from 1 to 3, not {eta}")
+    if not (is_number(eta) and 1.0 <= eta <= 3.0):  # type: ignore[operator]
+        raise InputError(f"{name} must be a number from 1 to 3, not {shown(eta)}")
 
 
-def coefficients(
-    name: str, values: object, low: float, above: bool = False, unit: str = "", high: float = math.inf
-) -> Array:
-    """Three finite numbers from `low` to `high`, read-only. Raises InputError, naming the channel and the value."""
+def coefficients(name: str, values: object, low: float, high: float, unit: str = "", *, above: bool = False) -> Array:
+    """Three numbers from `low` to `high`, read-only; `above` leaves out `low`. Raises InputError, naming the channel,
+    the range and the value."""
     try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = array_of(values)
+    except ValueError:
         array = np.empty(0)
     if array.shape != (3,):
-        raise InputError(f"{name} must be three numbers, not {values!r}")
+        raise InputError(f"{name} must be three numbers{f' ({unit})' if unit else ''}, not {shown(values)}")
     for channel, value in zip(CHANNELS, array.tolist(), strict=True):
-        if not (low < value if above else low <= value) or value > high or math.isinf(value):
-            bound = f"{'above' if above else 'at least'} {low:g}" if math.isinf(high) else f"from {low:g} to {high:g}"
-            raise InputError(f"{name} of {channel} must be {bound}{f' ({unit})' if unit else ''}, not {value:g}")
+        if not (low < value if above else low <= value) or value > high:
+            raise InputError(f"{name} of {channel} must be {span(low, high, above, unit)}, not {value:g}")
     array.flags.writeable = False
     return array

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
 from wgsss.optics import sources
-from wgsss.optics.medium import Medium, check_index
+from wgsss.optics.medium import LONGEST, Medium, check_index
 from wgsss.optics.profile import Profile, distances, shares
 from wgsss.optics.slab import Spectrum, check_alone, check_thickness, extrapolation, slab_spectra
+from wgsss.values import is_number, shown
 
 Array = NDArray[np.float64]
 
@@ -47,8 +48,9 @@ class Multipole(Medium, Profile):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_index("eta_below", self.eta_below)
-        if not (isinstance(self.thickness, int | float | np.number) and self.thickness < math.inf):
-            raise InputError(f"thickness must be a finite number (mm), not {self.thickness}")
+        if not (is_number(self.thickness) and self.thickness <= LONGEST):
+            most = f"{LONGEST:g} at most (mm)"
+            raise InputError(f"thickness must be a finite number, {most}, not {shown(self.thickness)}")
         check_thickness(self, self.thickness, "thickness")
         check_alone(self, self.thickness, self.eta_below)
 

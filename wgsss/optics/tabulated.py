@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
-from wgsss.optics.medium import CHANNELS
+from wgsss.optics.medium import CHANNELS, LONGEST, MOST_TOTAL
 from wgsss.optics.profile import Profile, distances, shares
+from wgsss.userfiles import read_text
+from wgsss.values import array_of, shown, span
 
 Array = NDArray[np.float64]
 
@@ -23,6 +25,9 @@ _COLUMNS = ("r", *(f"R of {channel}" for channel in CHANNELS))
 # Between the entries R^(1/16) is interpolated over the root of r, in which profiles bend little: an exponential or a
 # power of r, from 64 entries over four decades, comes back within 0.2 %. Unlike log R over log r it has a place for 0.
 _ROOT = 16
+
+_DENSEST = 1e18  # 1/mm^2: of R
+_MOST_ROWS = 10_000
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(26)  # per interval; exact for r R dr, of degree 51 in the root of r
 
@@ -40,8 +45,8 @@ class Tabulated(Profile):
 
     def __post_init__(self) -> None:
         try:
-            r, R = np.array(self.r, dtype=np.float64), np.array(self.R, dtype=np.float64)
-        except (TypeError, ValueError):
+            r, R = array_of(self.r), array_of(self.R)
+        except ValueError:
             raise InputError("a table of a profile must be numbers") from None
         if r.ndim != 1 or R.shape != (r.size, 3):
             raise InputError(f"a table needs n distances and n rows of 3 values, not shapes {r.shape} and {R.shape}")
@@ -49,6 +54,10 @@ class Tabulated(Profile):
         r.flags.writeable = R.flags.writeable = False
         object.__setattr__(self, "r", r)
         object.__setattr__(self, "R", R)
+        for channel, total in zip(CHANNELS, self.total.tolist(), strict=True):
+            if not total <= MOST_TOTAL:
+                found = f"{total:.3g} times the light in all, and may give {MOST_TOTAL:g} times at most"
+                raise InputError(f"R of {channel} gives back {found} (r is in mm, R in 1/mm^2)")
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -58,20 +67,13 @@ class Tabulated(Profile):
         file, the line and the value, for a file that cannot be read or is no such table.
         """
         path = Path(path)
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-        except FileNotFoundError:
-            raise InputError(f"{path}: no such file") from None
-        except UnicodeDecodeError:
-            raise InputError(f"{path}: not a CSV file: it is not UTF-8 text") from None
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+        text = read_text(path, "a CSV file")
         try:
             lines, table = _parse(text)
             _check(table[:, 0], table[:, 1:], lambda i: f"on line {lines[i]}")
-        except (InputError, csv.Error) as error:
+            return cls(table[:, 0], table[:, 1:])
+        except InputError as error:
             raise InputError(f"{path}: {error}") from None
-        return cls(table[:, 0], table[:, 1:])
 
     @cached_property
     def total(self) -> Array:
@@ -127,8 +129,11 @@ def _parse(text: str) -> tuple[list[int], Array]:
     lines: list[int] = []
     rows: list[list[float]] = []
     titled = False
-    reader = csv.reader((line.partition("#")[0] for line in text.splitlines()), skipinitialspace=True)
-    for cells in reader:
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            cells = next(csv.reader([line.partition("#")[0]], skipinitialspace=True), [])
+        except csv.Error:
+            raise InputError(f"line {number} is not a line of a CSV file") from None
         if not "".join(cells).strip():
             continue
         numbers = [_number(cell) for cell in cells]
@@ -136,11 +141,13 @@ def _parse(text: str) -> tuple[list[int], Array]:
             titled = True
             continue
         if len(cells) != len(_COLUMNS):
-            raise InputError(f"line {reader.line_num} has {len(cells)} columns, not 4 (r, R of red, green and blue)")
-        for name, cell, number in zip(_COLUMNS, cells, numbers, strict=True):
-            if number is None:
-                raise InputError(f"{name} on line {reader.line_num} is not a number: {cell.strip()!r}")
-        lines.append(reader.line_num)
+            raise InputError(f"line {number} has {len(cells)} columns, not 4 (r, R of red, green and blue)")
+        for name, cell, value in zip(_COLUMNS, cells, numbers, strict=True):
+            if value is None:
+                raise InputError(f"{name} on line {number} is not a number: {shown(cell.strip())}")
+        if len(rows) == _MOST_ROWS:
+            raise InputError(f"line {number}: a table of a profile has {_MOST_ROWS} rows at most")
+        lines.append(number)
         rows.append([n for n in numbers if n is not None])
     return lines, np.array(rows).reshape(-1, 4)
 
@@ -157,11 +164,12 @@ def _check(r: Array, R: Array, place: Callable[[int], str]) -> None:
     if r.size < 2:
         raise InputError(f"a table of a profile needs at least 2 rows, not {r.size}")
     for i, distance in enumerate(r.tolist()):
-        if not 0.0 <= distance < np.inf:
-            raise InputError(f"r {place(i)} must be at least 0 (mm) and finite, not {distance:g}")
+        if not 0.0 <= distance <= LONGEST:
+            raise InputError(f"r {place(i)} must be a number {span(0.0, LONGEST, unit='mm')}, not {distance:g}")
         if i and not r[i - 1] < distance:
             raise InputError(f"r must ascend: {distance:g} {place(i)} follows {r[i - 1]:g}")
-    for i, channel in np.argwhere(~((R >= 0.0) & (R < np.inf))):
+    for i, channel in np.argwhere(~((R >= 0.0) & (R <= _DENSEST))):
         raise InputError(
-            f"R of {CHANNELS[channel]} {place(i)} must be at least 0 (1/mm^2) and finite, not {R[i, channel]:g}"
+            f"R of {CHANNELS[channel]} {place(i)} must be a number {span(0.0, _DENSEST, unit='1/mm^2')}, "
+            f"not {R[i, channel]:g}"
         )

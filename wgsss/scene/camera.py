@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any, Self
 
 import numpy as np
@@ -14,6 +15,8 @@ from wgsss.scene import checks
 from wgsss.scene.checks import Triple
 
 Matrix = npt.NDArray[np.float64]
+
+_STEEPEST = 89.999  # degrees above the horizontal; straight up, nothing would tell where the image's top is
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,9 @@ class _Camera:
     """the direction that points up in the image, of any length but zero"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "eye")
-        checks.triple(self, "target")
-        checks.triple(self, "up", nonzero=True)
+        checks.position(self, "eye")
+        checks.position(self, "target")
+        checks.direction(self, "up")
         gaze = np.subtract(self.target, self.eye)
         if math.hypot(*gaze) < 1e-9:
             raise InputError("eye and target must not be the same point")
@@ -57,7 +60,13 @@ class _Camera:
 
         `distance` is in mm. `azimuth`, in degrees, is 0 on the +z side and 90 on the +x side; `elevation`, in degrees
         above the horizontal, lies between -90 and 90, both excluded. `rest` are the camera's further fields.
+        Raises InputError naming what is out of range.
         """
+        orbit = SimpleNamespace(target=target, distance=distance, azimuth=azimuth, elevation=elevation)
+        checks.position(orbit, "target")
+        checks.number(orbit, "distance", checks.SMALLEST, checks.COORDINATE, "mm")
+        checks.number(orbit, "azimuth", -checks.ANGLE, checks.ANGLE, "degrees")
+        checks.number(orbit, "elevation", -_STEEPEST, _STEEPEST, "degrees")
         around, above = math.radians(azimuth), math.radians(elevation)
         offset = np.array([math.sin(around) * math.cos(above), math.sin(above), math.cos(around) * math.cos(above)])
         return cls(tuple(np.add(target, distance * offset)), target, **rest)
@@ -74,8 +83,8 @@ class PerspectiveCamera(_Camera):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.number(self, "fov", 0.05, 170)
-        checks.number(self, "turn")
+        checks.number(self, "fov", 0.05, 170, "degrees")
+        checks.number(self, "turn", -checks.ANGLE, checks.ANGLE, "degrees per second")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:
         """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""
@@ -103,8 +112,8 @@ class OrthographicCamera(_Camera):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.number(self, "height", 1e-6)
-        checks.number(self, "turn")
+        checks.number(self, "height", checks.SMALLEST, checks.LENGTH, "mm")
+        checks.number(self, "turn", -checks.ANGLE, checks.ANGLE, "degrees per second")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:
         """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""

@@ -9,11 +9,8 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene import checks
-from wgsss.scene.checks import Triple
+from wgsss.scene.checks import BRIGHTEST, Triple
 from wgsss.scene.images import read_sky
-
-BRIGHTEST = 1e9
-"""W/(m^2 sr), of an environment; the sun has 2e7"""
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,8 @@ class DirectionalLight:
     """RGB, W/m^2, on a surface facing the light"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "direction", nonzero=True)
-        checks.triple(self, "irradiance", 0)
+        checks.direction(self, "direction")
+        checks.triple(self, "irradiance", 0, BRIGHTEST, "W/m^2")
 
 
 @dataclass(frozen=True)
@@ -40,8 +37,8 @@ class PointLight:
     """RGB, W/sr"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "position")
-        checks.triple(self, "intensity", 0)
+        checks.position(self, "position")
+        checks.triple(self, "intensity", 0, checks.STRONGEST, "W/sr")
 
 
 @dataclass(frozen=True)
@@ -64,13 +61,13 @@ class RectLight:
     """points on the rectangle that light and shadow are computed from"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "position")
-        checks.triple(self, "direction", nonzero=True)
-        checks.triple(self, "up", nonzero=True)
+        checks.position(self, "position")
+        checks.direction(self, "direction")
+        checks.direction(self, "up")
         checks.not_parallel(self.direction, self.up, "up must not be parallel to direction")
-        checks.number(self, "width", 0, above=True)
-        checks.number(self, "height", 0, above=True)
-        checks.triple(self, "radiance", 0)
+        checks.number(self, "width", checks.SMALLEST, checks.LENGTH, "mm")
+        checks.number(self, "height", checks.SMALLEST, checks.LENGTH, "mm")
+        checks.triple(self, "radiance", 0, BRIGHTEST, "W/(m^2 sr)")
         checks.integer(self, "samples", 1, 256)
 
 
@@ -88,9 +85,9 @@ class SphereLight:
     """points on the sphere that light and shadow are computed from"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "position")
-        checks.number(self, "radius", 0, above=True)
-        checks.triple(self, "radiance", 0)
+        checks.position(self, "position")
+        checks.number(self, "radius", checks.SMALLEST, checks.LENGTH, "mm")
+        checks.triple(self, "radiance", 0, BRIGHTEST, "W/(m^2 sr)")
         checks.integer(self, "samples", 1, 256)
 
 
@@ -112,8 +109,8 @@ class EnvironmentLight:
     """degrees by which the environment is turned about +y, counter-clockwise seen from above"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "radiance", 0)
-        checks.number(self, "rotation")
+        checks.triple(self, "radiance", 0, BRIGHTEST, "W/(m^2 sr)")
+        checks.number(self, "rotation", -checks.ANGLE, checks.ANGLE, "degrees")
         if self.file is not None and not isinstance(self.file, str):
             raise InputError(f"file must be the path of a .hdr or .exr image, not {self.file!r}")
 

@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, unknown
 from wgsss.optics import SKIN_GAUSSIANS, Dipole, Layer, Layers, Profile, SumOfGaussians, Tabulated
-from wgsss.optics.medium import coefficients, stack
+from wgsss.optics.medium import DENSEST, THINNEST, coefficients, stack
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
+from wgsss.text import shortened
 
 WRAPS = ("repeat", "clamp", "mirror")  # in the order of wgsl/mesh.wgsl
 SLOTS = ("base_color", "normal", "specular")
@@ -92,10 +93,11 @@ class Material:
         if len(given) > 1 or (given and (self.sigma_a is not None or self.sigma_s_prime is not None)):
             raise InputError(f"{given[0]} stand in place of sigma_a and sigma_s_prime: give one or the other")
         try:
+            checks.name(self)
             checks.number(self, "eta", 1, 3)
             self._check_medium()
         except InputError as error:
-            raise InputError(f"material '{self.name}': {error}") from None
+            raise InputError(f"material '{shortened(self.name, 60)}': {error}") from None
         checks.number(self, "roughness", 0.02, 1)
         checks.number(self, "specular", 0, 1)
         checks.triple(self, "base_color", 0, 1)
@@ -119,8 +121,8 @@ class Material:
                 raise InputError(
                     f"{missing} is missing: a material needs sigma_a and sigma_s_prime, or {', '.join(IN_PLACE)}"
                 )
-            for name, least in (("sigma_a", 0.0), ("sigma_s_prime", 1e-6)):
-                sigma = coefficients(name, getattr(self, name), least, unit="1/mm", high=1e6)
+            for name, least in (("sigma_a", 0.0), ("sigma_s_prime", THINNEST)):
+                sigma = coefficients(name, getattr(self, name), least, DENSEST, "1/mm")
                 object.__setattr__(self, name, tuple(sigma.tolist()))
 
     @cached_property

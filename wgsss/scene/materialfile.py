@@ -13,6 +13,8 @@ from wgsss.optics import Dipole, Layer, SumOfGaussians, Tabulated
 from wgsss.scene import tables
 from wgsss.scene.images import read_map
 from wgsss.scene.material import IN_PLACE, MATERIALS, SLOTS, Maps, Material, material
+from wgsss.userfiles import path_from
+from wgsss.values import shown
 
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 _INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")
@@ -54,12 +56,14 @@ def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
     if isinstance(value, dict):
         return _from_table(value, folder, where, "custom")
     if not isinstance(value, str | Path):
-        raise InputError(f"material must be a name, a file or a table, not {value!r}")
+        raise InputError(f"material must be a name, a file or a table, not {shown(value)}")
+    if not str(value).strip():
+        raise InputError("the name of the material is empty")
     if not Path(value).suffix and os.sep not in str(value):
         return Chosen(material(str(value)), coloured=False)
-    path = folder / Path(value).expanduser()
+    path = path_from(str(value), folder)
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{path}: a material file must end in .toml")
+        raise InputError(f"{path}: the file extension of a material file must be .toml")
     return _from_table(tables.read_toml(path), path.parent, str(path), path.stem)
 
 
@@ -71,7 +75,9 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
     values: tables.Table = {"name": name}
     if "preset" in table:
         try:
-            preset = material(str(table["preset"]))
+            if not isinstance(table["preset"], str):
+                raise InputError(f"must be the name of a material, not {shown(table['preset'])}")
+            preset = material(table["preset"])
         except InputError as error:
             raise tables.at(f"{where}: preset", error) from None
         values = {key: getattr(preset, key) for key in parameters}

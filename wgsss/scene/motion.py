@@ -30,11 +30,11 @@ class BendAndSwell:
     """seconds"""
 
     def __post_init__(self) -> None:
-        checks.number(self, "length", 0, above=True)
-        checks.number(self, "bend", 0, 180)
+        checks.number(self, "length", checks.SMALLEST, checks.LENGTH, "mm")
+        checks.number(self, "bend", 0, 180, "degrees")
         checks.number(self, "swell", 0, 0.9)
-        checks.number(self, "waves", 0)
-        checks.number(self, "period_s", 0, above=True)
+        checks.number(self, "waves", 0, 1000)
+        checks.number(self, "period_s", 1e-3, checks.SECONDS, "seconds")
 
     def apply(self, positions: npt.ArrayLike, time_s: float) -> npt.NDArray[np.float32]:
         """Positions (V,3), mm, at a time in seconds, of positions (V,3) at rest."""

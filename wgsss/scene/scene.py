@@ -51,8 +51,8 @@ class Object:
     """in the object's own space, before it is placed"""
 
     def __post_init__(self) -> None:
-        checks.triple(self, "translate")
-        checks.triple(self, "rotate")
+        checks.position(self, "translate")
+        checks.triple(self, "rotate", -checks.ANGLE, checks.ANGLE, "degrees")
 
     @cached_property
     def matrix(self) -> npt.NDArray[np.float64]:
@@ -102,9 +102,10 @@ class Scene:
     def __post_init__(self) -> None:
         object.__setattr__(self, "objects", tuple(self.objects))
         object.__setattr__(self, "lights", tuple(self.lights))
+        checks.name(self)
         if not self.objects:
             raise InputError(f"{self.name}: the scene has no objects")
-        checks.number(self, "exposure", -32, 32)
+        checks.number(self, "exposure", -32, 32, "stops")
         checks.number(self, "bloom", 0, 1)
         if self.tone_map not in TONE_MAPS:
             raise unknown("tone_map", str(self.tone_map), TONE_MAPS)

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.errors import InputError, unknown
-from wgsss.userfiles import require_file
+from wgsss.userfiles import path_from, read_text, require_file
+from wgsss.values import shown
 
 Table = dict[str, Any]
 Parameters = Mapping[str, inspect.Parameter]
@@ -17,21 +18,24 @@ Parameters = Mapping[str, inspect.Parameter]
 
 _KINDS: dict[str, tuple[Any, str]] = {  # what TOML may give for a parameter, by its annotation
     "str": (str, "text"),
-    "str | None": (str | None, "text"),
     "float": (float | int, "a number"),
+    "int": (float | int, "a whole number"),
+    "bool": (bool, "true or false"),
     "Triple": (list | tuple, "three numbers"),
 }
 
 
 def read_toml(path: Path) -> Table:
     """The top-level table of a file. Raises InputError, naming the file, where it is missing or not TOML."""
-    require_file(path)
+    text = read_text(path, "a TOML file")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a TOML file: it is not UTF-8 text") from None
-    except (ValueError, RecursionError) as error:  # of its grammar, too long a number, too deep a nesting
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:  # it names the line
         raise InputError(f"{path}: not a TOML file: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: not a TOML file: it is nested too deep") from None
+    except ValueError:
+        raise InputError(f"{path}: not a TOML file: it holds a number, date or time that cannot be") from None
 
 
 def call(function: Callable[..., Any], table: Table, where: str, parameters: Parameters | None = None) -> Any:
@@ -39,24 +43,25 @@ def call(function: Callable[..., Any], table: Table, where: str, parameters: Par
     parameters = parameters or inspect.signature(function).parameters
     check_keys(table, parameters, where)
     for key, parameter in parameters.items():
-        if key not in table and parameter.default is inspect.Parameter.empty:
+        if key in table:
+            _check_kind(parameter, table[key], where)
+        elif parameter.default is inspect.Parameter.empty:
             raise InputError(f"{where}: key '{key}' is missing")
-        if parameter.annotation in ("str", "str | None"):
-            _check_kind(parameter, table, where)
     try:
         return function(**table)
     except InputError as error:
         raise at(where, error) from None
-    except (TypeError, ValueError) as error:
-        for parameter in parameters.values():
-            _check_kind(parameter, table, where)
-        raise InputError(f"{where}: a value of the wrong type: {error}") from None
 
 
-def _check_kind(parameter: inspect.Parameter, table: Table, where: str) -> None:
-    kinds, what = _KINDS.get(str(parameter.annotation), (object, ""))
-    if parameter.name in table and not isinstance(table[parameter.name], kinds):
-        raise InputError(f"{where}: {parameter.name} must be {what}, not {table[parameter.name]!r}")
+def _check_kind(parameter: inspect.Parameter, value: Any, where: str) -> None:
+    kind, _, other = str(parameter.annotation).partition(" | ")
+    if kind not in _KINDS or other not in ("", "None"):
+        return
+    kinds, what = _KINDS[kind]
+    if value is None and other:
+        return
+    if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
+        raise InputError(f"{where}: {parameter.name} must be {what}, not {shown(value)}")
 
 
 def call_kind(table: Any, kinds: Mapping[str, Any], where: str) -> Any:
@@ -69,15 +74,17 @@ def call_kind(table: Any, kinds: Mapping[str, Any], where: str) -> Any:
 
 def choose(choices: Mapping[str, Any], name: Any, what: str, where: str) -> Any:
     """One of the choices by its name."""
-    if not isinstance(name, str) or name not in choices:
-        raise at(where, unknown(what, str(name), choices))
+    if not isinstance(name, str):
+        raise InputError(f"{where}: {what} must be text, not {shown(name)}")
+    if name not in choices:
+        raise at(where, unknown(what, name, choices))
     return choices[name]
 
 
 def check_keys(table: Any, known: Iterable[str] | None, where: str) -> None:
     """Raise InputError unless this is a table without any key but those known; None stands for any."""
     if not isinstance(table, dict):
-        raise InputError(f"{where}: must be a table, not {table!r}")
+        raise InputError(f"{where} must be a table, not {shown(table)}")
     for key in table:
         if known is not None and key not in known:
             raise at(where, unknown("key", key, known))
@@ -86,9 +93,9 @@ def check_keys(table: Any, known: Iterable[str] | None, where: str) -> None:
 def file_in(table: Table, key: str, where: str, folder: Path) -> Path:
     """The file that a key names, relative to a folder. Raises InputError unless it is there."""
     if not isinstance(table[key], str):
-        raise InputError(f"{where}: {key} must be the path of a file, not {table[key]!r}")
-    path = folder / Path(table[key]).expanduser()
+        raise InputError(f"{where}: {key} must be the path of a file, not {shown(table[key])}")
     try:
+        path = path_from(table[key], folder)
         require_file(path)
     except InputError as error:
         raise at(f"{where}: {key}", error) from None

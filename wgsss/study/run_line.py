@@ -15,7 +15,7 @@ Run = dict[str, Any]
 Check = Callable[[str, Any], None]
 """raises InputError, naming the key, where its value is not what it should be"""
 
-_LONGEST = 1000  # characters of a text
+_LONGEST = 100_000  # characters of a text
 _SHORTEST = 1e-9  # ms of a frame, whose logarithm charts show
 _GREATEST = 1e12  # a number, of any unit: so much that no product of a few overflows
 
