@@ -96,6 +96,36 @@ def test_film_has_even_sides_the_colours_of_the_display_and_black_where_nothing_
         assert picture[1:4, 7].max() <= 6
 
 
+@pytest.mark.parametrize("name", ["a.PNG", "a.EXR", "a.NPY", "a.Npy", "a.MP4", "a.b.Exr"])
+def test_extensions_in_capitals_write_the_same_and_leave_nothing_else(image: Image, tmp_path: Path, name: str) -> None:
+    written = save(image, tmp_path / name)
+    assert set(tmp_path.iterdir()) == set(written)
+    plain = (tmp_path / "plain").with_suffix(Path(name).suffix.lower())
+    others = save(image, plain)
+    if plain.suffix != ".mp4":
+        assert [path.read_bytes() for path in written] == [path.read_bytes() for path in others]
+    assert all(path.suffix == Path(name).suffix for path in written)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.PNG", "a.exr", "a.NPY", "a.MP4"])
+def test_a_disk_that_fails_leaves_nothing(
+    image: Image, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("wgsss.output.os.replace", full)
+    with pytest.raises(InputError, match="No space left"):
+        save(image, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_png_in_a_folder_named_like_an_archive(image: Image, tmp_path: Path) -> None:
+    (tmp_path / "a.zip").mkdir()
+    save(image, tmp_path / "a.zip" / "a.png")
+    assert [path.name for path in (tmp_path / "a.zip").iterdir()] == ["a.png"]
+
+
 def test_frames_are_numbered_from_one(image: Image, tmp_path: Path) -> None:
     written = save_frames([image] * 2, tmp_path / "a.png")
     assert [path.name for path in written] == ["a.0001.png", "a.0002.png"]

@@ -33,9 +33,10 @@ _AXES = {"depth": "Z", "normal": "XYZ"}  # the EXR channels of extra outputs tha
 
 
 def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
-    """The path, if a file with one of these endings can be written there; to be asked before anything that takes long.
+    """The path, if a file with one of these extensions, in capitals or not, can be written there; to be asked before
+    anything that takes long.
 
-    Raises InputError for another ending, a folder that is missing, and a place that cannot be written.
+    Raises InputError for another extension, a folder that is missing, and a place that cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in formats:
@@ -85,7 +86,7 @@ def _told(path: Path) -> Iterator[None]:
 def save(image: Image, path: str | Path) -> list[Path]:
     """Write an image, and give back the files written.
 
-    The ending says what they hold. `.png`: what a display shows, with coverage in alpha. `.exr`: linear radiance as
+    The extension says what they hold. `.png`: what a display shows, with coverage in alpha. `.exr`: linear radiance as
     float32 channels R, G, B and A (coverage), and the image's extra outputs as layers (`irradiance.R`, `depth.Z`,
     `normal.X`). `.npy`: the same radiance, float32 (H, W, 4), and beside it `<name>.depth.npy` and so on.
     `.mp4`: a film of this frame. `depth` is 0 where nothing is seen. PNG and EXR carry the image's metadata under
@@ -107,7 +108,8 @@ def _write(image: Image, path: Path) -> list[Path]:
         paths = [path, *(path.with_name(f"{path.stem}.{name}{path.suffix}") for name in layers)]
         with replacing(*paths) as files:
             for file, values in zip(files, [image.pixels, *layers.values()], strict=True):
-                np.save(file, np.asarray(values, np.float32))
+                with file.open("wb") as opened:  # to a name that does not end in .npy, such as .NPY, numpy adds it
+                    np.save(opened, np.asarray(values, np.float32))
         return paths
     with replacing(path) as (file,):
         (_write_png if path.suffix.lower() == ".png" else _write_exr)(image, layers, file)
@@ -145,13 +147,14 @@ def _labels(image: Image) -> dict[str, str]:
 
 
 def _write_png(image: Image, layers: dict[str, Array], file: Path) -> None:
-    from PIL import Image as Picture
+    import imageio.v3 as iio
     from PIL.PngImagePlugin import PngInfo
 
     text = PngInfo()
     for key, value in _labels(image).items():
         text.add_text(key, value)
-    Picture.fromarray(np.ascontiguousarray(image.display)).save(file, format="png", pnginfo=text)
+    with file.open("wb") as opened:  # imageio looks for archives and addresses in names
+        iio.imwrite(opened, np.ascontiguousarray(image.display), extension=".png", plugin="pillow", pnginfo=text)
 
 
 def _write_exr(image: Image, layers: dict[str, Array], file: Path) -> None:
@@ -203,7 +206,7 @@ def _encoder(file: Path, width: int, height: int, fps: float, said: IO[bytes]) -
     # Without these marks players take small films to be BT.601 and show other colours.
     marks = [part for name in ("colorspace", "color_primaries", "color_trc") for part in (f"-{name}", "bt709")]
     target = ["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", "scale=out_color_matrix=bt709", *marks]
-    place = ["-movflags", "+faststart", f"file:{file}"]
+    place = ["-movflags", "+faststart", "-f", "mp4", f"file:{file}"]
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *source, *target, *place]
     # In a session of its own, so that an interrupt from the keyboard reaches only us.
     return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said, start_new_session=True)

@@ -14,6 +14,7 @@ from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.environment import prefilter
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
+from wgsss.bake.suns import take_suns
 from wgsss.emitters import emitters
 from wgsss.errors import Note
 from wgsss.frame import Frame, begin
@@ -30,7 +31,7 @@ Array = npt.NDArray[Any]
 TOLERANCE, SAMPLES = 0.01, 1_000_000
 _PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
 _CODE = (
-    *(Stage, Samples, begin, emitters, prefilter, sky_visibility, converged, make_kernel, surface_sum),
+    *(Stage, Samples, begin, emitters, prefilter, take_suns, sky_visibility, converged, make_kernel, surface_sum),
     *("reference/integral", "reference/integral_receivers", "frame/irradiance_points", "frame/shadow"),
     *("frame/rho_dt", "frame/prefilter_irradiance"),
 )

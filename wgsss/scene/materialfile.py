@@ -102,7 +102,9 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
     for key in slots.keys() & table.keys():
         path = tables.file_in(table, key, where, folder)
         images[slots[key]] = tables.call(
-            read_map, {"path": path, "mode": "L" if key == "specular_map" else "RGB"}, f"{where}: {key}"
+            read_map,
+            {"source": path, "mode": "L" if key == "specular_map" else "RGB", "linear": key != "base_color_map"},
+            f"{where}: {key}",
         )
     chosen = Chosen(tables.call(Material, values, where), coloured="base_color" in table)
     return replace(chosen, material=chosen.on(Maps(**images)))

@@ -67,7 +67,7 @@ def _header(head: bytes, path: Path) -> Header:
     damaged = InputError("damaged, or not a Radiance .hdr file")
     if not head.startswith(b"#?"):
         raise damaged
-    scale, primaries, xyz, at = np.ones(3), None, False, 0
+    divisors, primaries, xyz, at = [np.ones(3)], None, False, 0
     while True:
         end = head.find(b"\n", at)
         if end < 0:
@@ -82,20 +82,22 @@ def _header(head: bytes, path: Path) -> Header:
                 raise InputError(f"FORMAT={_text(value)} is not supported")
             xyz = value.strip() == b"32-bit_rle_xyze"
         elif name == b"EXPOSURE":
-            scale = scale / _numbers(name, value, 1, above=0.0)
+            divisors.append(_numbers(name, value, 1, above=0.0))
         elif name == b"COLORCORR":
-            scale = scale / _numbers(name, value, 3, above=0.0)
+            divisors.append(_numbers(name, value, 3, above=0.0))
         elif name == b"PRIMARIES":
             found = _numbers(name, value, 8)
             primaries = found if found.any() else None  # some writers fill it with zeros
         elif name == b"GAMMA" and (_numbers(name, value, 1, above=0.0) != 1.0).any():
             warnings.warn(f"{path}: GAMMA={_text(value)} is not applied", Note, stacklevel=2)
+    with np.errstate(all="ignore"):
+        scale = np.prod(1.0 / np.stack([np.broadcast_to(d, 3) for d in divisors]), axis=0)
     if not (np.isfinite(scale).all() and scale.all()):
         raise InputError("EXPOSURE and COLORCORR, all multiplied, are beyond what numbers hold")
     end = head.find(b"\n", at)
     size = _SIZE.fullmatch(head[at:end].rstrip(b"\r")) if end >= 0 else None
     if size is None or size[2] == size[5]:
-        raise InputError(f"damaged: its size should come next, not '{_text(head[at : max(end, at)])}'")
+        raise InputError(f"damaged: its size should come next, not '{_text(head[at : end if end >= 0 else None])}'")
     shape = int(size[3]), int(size[6])
     check_size(*(shape[::-1] if size[2] == b"Y" else shape))
     if xyz:

@@ -25,7 +25,7 @@ from wgsss.userfiles import require_file
 Array = npt.NDArray[Any]
 
 # Pillow has readers that start other programs (EPS) and such that take almost any file for theirs (TGA).
-_FORMATS = ("PNG", "JPEG", "MPO", "TIFF", "WEBP", "BMP", "GIF", "PPM", "JPEG2000", "DDS", "PSD")
+_FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "GIF", "PPM", "JPEG2000", "DDS", "PSD", "WEBP")
 _TGA = (".tga", ".icb", ".vda", ".vst")
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 # Pillow's names of how the bytes of a PNG are packed: those of 16 bits that it reduces; the mode, and the name by which
@@ -112,7 +112,7 @@ def _opened(data: bytes, tga: bool) -> Any:
     """A Pillow image of a size that can be used, not decoded yet."""
     from PIL import Image
 
-    image = Image.open(io.BytesIO(data), formats=(*_FORMATS, *(("TGA",) if tga else ())))
+    image = Image.open(io.BytesIO(data), formats=("TGA", *_FORMATS) if tga else _FORMATS)
     check_size(*image.size)
     return image
 
