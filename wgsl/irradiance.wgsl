@@ -16,5 +16,5 @@ fn transmitted(at: Incident, n: Direction, specular: Number, lit: Number, rho_dt
 fn transmitted_environment(environment: texture_2d<f32>, linear_wrap_u: sampler, n: Direction, sky: Number) -> Irradiance {
     let at = map_of_direction(n, textureDimensions(environment));
     let received = textureSampleLevel(environment, linear_wrap_u, at, 0.0);
-    return sky * received.a * received.rgb;
+    return sky * received.a * received.a * received.rgb;
 }

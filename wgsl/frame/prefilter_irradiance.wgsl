@@ -6,7 +6,7 @@ import package::sampling::{direction_of_lat_long, direction_of_map};
 
 struct Params {
     specular: Number,
-    unit: Number, // what a value of 1 stands for
+    root: Number, // of what a value of 1 stands for
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -36,5 +36,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     // The cosines' integral is pi; dividing by their sum takes the grid's own error out.
-    textureStore(irradiance, id.xy, vec4f(total * (PI / max(cosines, 1e-9)) / params.unit, params.unit));
+    textureStore(irradiance, id.xy, vec4f(total * (PI / max(cosines, 1e-9)) / (params.root * params.root), params.root));
 }

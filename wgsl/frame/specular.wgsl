@@ -55,7 +55,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     // sky that is hidden is that of the whole hemisphere, not of the lobe.
     let towards = map_of_direction(reflect(-w_o, n), textureDimensions(reflection));
     let mirrored = textureSampleLevel(reflection, linear_wrap_u, towards, 0.0);
-    var total = seen.w * mirrored.a * mirrored.rgb * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
+    var total = seen.w * mirrored.a * mirrored.a * mirrored.rgb * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);

@@ -20,13 +20,13 @@ IRRADIANCE_SIZE = (128, 64)  # the cosine leaves little that is finer
 REFLECTION_SIZE = (128, 64)
 _SOURCE_SIZE = (128, 64)
 NO_SKY = np.zeros((1, 1, 3), np.float32)
-_UNITS = (-14, 15)  # powers of two that a half float holds
+_ROOTS = (-14, 15)  # powers of two that a half float holds
 
 
 @dataclass(frozen=True)
 class Prefiltered:
     """Textures over directions (`map_of_direction`, wgsl/sampling.wgsl): L_d by normal, W/m^2, and mean radiance by
-    mirror direction, W/(m^2 sr). RGB is in units of alpha: half floats hold no more than 65504."""
+    mirror direction, W/(m^2 sr). RGB is in units of alpha squared: half floats hold no more than 65504."""
 
     irradiance: Any
     reflection: Any
@@ -53,7 +53,7 @@ def prefilter(gpu: Gpu, pixels: npt.NDArray[np.float32], material: Material) -> 
         black = gpu.texture(np.zeros((1, 1, 4)), "rgba16float")
         return Prefiltered(black, black)
     constant = bool((pixels == pixels[0, 0]).all())
-    unit = 2.0 ** min(max(math.ceil(math.log2(pixels.max())), _UNITS[0]), _UNITS[1])
+    root = 2.0 ** min(max(math.ceil(0.5 * math.log2(pixels.max())), _ROOTS[0]), _ROOTS[1])
 
     def make() -> dict[str, npt.NDArray[Any]]:
         graph = Graph(gpu)
@@ -62,14 +62,14 @@ def prefilter(gpu: Gpu, pixels: npt.NDArray[np.float32], material: Material) -> 
         irradiance = graph.dispatch(
             "frame/prefilter_irradiance",
             size=(1, 1) if constant else IRRADIANCE_SIZE,
-            params={"specular": material.specular, "unit": unit},
+            params={"specular": material.specular, "root": root},
             environment=source,
             rho_dt_table=table,
         )
         reflection = graph.dispatch(
             "frame/prefilter_reflection",
             size=(1, 1) if constant else REFLECTION_SIZE,
-            params={"alpha": material.roughness**2, "unit": unit},
+            params={"alpha": material.roughness**2, "root": root},
             environment=source,
         )
         graph.run(irradiance, reflection)

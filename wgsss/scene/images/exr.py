@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import io
 import os
 from collections.abc import Iterator
@@ -116,20 +117,23 @@ def _opened(path: Path, header_only: bool) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence the OpenEXR library, which reports damage on both standard streams, below Python, before it raises."""
-    try:
-        saved = os.dup(2)
-    except OSError:  # there is no such stream
-        yield
-        return
+    """Silence the OpenEXR library, which reports damage on both standard streams, also below Python."""
+    saved = {}
+    for stream in (1, 2):
+        with contextlib.suppress(OSError):  # there is no such stream
+            saved[stream] = os.dup(stream)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
+        for stream in saved:
+            os.dup2(nowhere, stream)
         with contextlib.redirect_stdout(io.StringIO()):
             yield
     finally:
-        os.dup2(saved, 2)
-        os.close(saved)
+        with contextlib.suppress(TypeError, OSError, AttributeError):  # elsewhere than on POSIX
+            ctypes.CDLL(None).fflush(None)  # what C has not written yet
+        for stream, before in saved.items():
+            os.dup2(before, stream)
+            os.close(before)
         os.close(nowhere)
 
 
