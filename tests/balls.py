@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import warnings
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,13 @@ def checkered(image: bytes | str | None = None, node: dict[str, Any] | None = No
     file = File()
     file.node(mesh=file.mesh(ball_primitive(file, colored(file, image, **info))), **(node or {}))
     return file
+
+
+def transformed(uvs: Array, offset: Any = (0, 0), rotation: float = 0.0, scale: Any = (1, 1)) -> Array:
+    """What KHR_texture_transform makes of coordinates: translation * rotation * scale of (u, v, 1), by hand."""
+    cos, sin = math.cos(rotation), math.sin(rotation)
+    turn = np.array([[cos, sin], [-sin, cos]])
+    return (uvs * scale) @ turn.T + offset
 
 
 def loaded(file: File, path: Path, **options: Any) -> Scene:

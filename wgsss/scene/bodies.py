@@ -88,7 +88,7 @@ def load_file(
     animation: str | None = None,
     simplify: int | None = None,
 ) -> LoadedFile:
-    """Read a .ply, .obj, .stl, .off, .glb or .gltf file: one body for each material that looks different.
+    """Read a .ply, .obj, .stl, .off, .glb or .gltf file: one body for each look that its materials have.
 
     `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
     others. `size_mm` scales the longest side of the bounding box, at rest, to a length, whatever the unit. `animation`
@@ -106,8 +106,10 @@ def load_file(
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
     groups: dict[Look, list[int]] = {}
+    first_of: dict[Look, Look] = {}  # whatever they are called
     for number, part in enumerate(file.contents.parts):
-        groups.setdefault(wearable(part, file.say), []).append(number)
+        look = wearable(part, file.say)
+        groups.setdefault(first_of.setdefault(replace(look, name=""), look), []).append(number)
     bodies = file.bodies(groups)
     return LoadedFile(bodies, file.contents.lights, file.contents.cameras)
 

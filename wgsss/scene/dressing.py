@@ -22,6 +22,9 @@ Say = Callable[[str], None]
 FARTHEST_UV = 1e6
 """Texture coordinates beyond this, or not finite, are taken as 0: no texel could be told from its neighbours there."""
 
+_SQUARED = 256
+"""Texels on a side below which a mask that is not interpolated is refined, so that its corners are not cut off."""
+
 
 def lead(look: Look) -> Texture | None:
     """The texture whose place on the surface all textures of the look share."""
@@ -97,6 +100,9 @@ class Wardrobe:
             wrap = look.base_color_map.wrap
             found = self._image(replace(look.base_color_map, channels="A"), "alpha")
             alpha = alpha if found is None else found
+            if look.base_color_map.nearest:  # its outline follows the sides of texels
+                finer = min(max(_SQUARED // max(alpha.shape), 1), 16)
+                alpha = alpha.repeat(finer, axis=0).repeat(finer, axis=1)
         return Mask(look.alpha * alpha / 255.0, look.cutoff, wrap)
 
     def _image(self, texture: Texture | None, slot: str) -> Array | None:
