@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from wgsss.errors import Note
 from wgsss.scene.bodies import LoadedFile
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.light import DirectionalLight, Light, PointLight
+from wgsss.scene.repair import counted
 from wgsss.scene.scene import Object
 
+MM_PER_METRE = 1000.0
 NARROWEST, WIDEST = 0.05, 170.0  # degrees, of a camera's view
 
 
 def lights_of(file: LoadedFile) -> list[Light]:
-    """All lights of a file, lengths in mm."""
+    """All lights of a file, lengths in mm.
+
+    Where the file's unit is taken for another length than a metre, a point light's intensity is scaled, so that what
+    arrives at the mesh stays the same.
+    """
     scale = file.bodies[0].mm_per_unit
     found: list[Light] = []
     for light in file.lights:
         if light.kind == "directional":
             found.append(DirectionalLight(light.direction, light.power))
         else:
-            found.append(PointLight(_triple(np.asarray(light.position) * scale), light.power))
+            intensity = np.asarray(light.power) * (scale / MM_PER_METRE) ** 2
+            found.append(PointLight(_triple(np.asarray(light.position) * scale), _triple(intensity)))
     return found
 
 
@@ -42,6 +51,13 @@ def camera_in(file: LoadedFile, things: Sequence[Object]) -> Camera | None:
     if seen.height is not None:
         return OrthographicCamera(**place, height=seen.height * scale)
     return PerspectiveCamera(**place, fov=min(max(seen.fov or 0.0, NARROWEST), WIDEST))
+
+
+def note_unused(where: str, count: int, what: str, why: str) -> None:
+    """Warn that so many lights or cameras of a mesh file are not used, and why, or what would use them."""
+    if count:
+        note = f"{where}: {counted(count, what)} of the file {'is' if count == 1 else 'are'} not used{why}"
+        warnings.warn(note, Note, stacklevel=3)
 
 
 def _triple(values: Any) -> tuple[float, float, float]:

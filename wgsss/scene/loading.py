@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from wgsss.errors import InputError, Note, unknown
+from wgsss.errors import InputError, unknown
 from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, framing
-from wgsss.scene.fileview import camera_in, lights_of
+from wgsss.scene.fileview import camera_in, lights_of, note_unused
 from wgsss.scene.light import Light
 from wgsss.scene.material import Material
 from wgsss.scene.materialfile import Chosen, choose_material
 from wgsss.scene.meshobjects import objects_of
-from wgsss.scene.repair import counted
 from wgsss.scene.scene import Object, Scene
 from wgsss.scene.scenefile import camera_of, light_of, read_scene
 from wgsss.scene.tables import Table
@@ -93,22 +91,19 @@ def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: boo
         lights = lights_of(file)
         if not lights:
             raise InputError(f"{path}: it holds no lights")
-    elif file.lights:
-        _left_out(path, len(file.lights), "light", "--file-lights")
+    else:
+        uses = " (--file-lights uses it)" if len(file.lights) == 1 else " (--file-lights uses them)"
+        note_unused(path.name, len(file.lights), "light", uses)
     camera: Camera | None = None
     if file_camera:
         camera = camera_in(file, things)
         if camera is None:
             raise InputError(f"{path}: it holds no camera")
-    elif file.cameras:
-        _left_out(path, len(file.cameras), "camera", "--file-camera")
+        note_unused(path.name, len(file.cameras) - 1, "camera", ": the first one is")
+    else:
+        uses = " (--file-camera uses it)" if len(file.cameras) == 1 else " (--file-camera uses the first)"
+        note_unused(path.name, len(file.cameras), "camera", uses)
     return Scene(path.stem, things, tuple(lights), camera or framing(things))
-
-
-def _left_out(path: Path, count: int, what: str, option: str) -> None:
-    not_used = "is not used ({} uses it)" if count == 1 else "are not used ({} uses them)"
-    note = f"{path.name}: {counted(count, what)} of the file {not_used.format(option)}"
-    warnings.warn(note, Note, stacklevel=2)
 
 
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:

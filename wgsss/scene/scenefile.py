@@ -24,6 +24,7 @@ from wgsss.scene.animation import NONE
 from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.fileview import note_unused
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
 from wgsss.scene.materialfile import choose_material
 from wgsss.scene.meshobjects import objects_of
@@ -85,8 +86,11 @@ def _objects(table: Table, where: str, folder: Path) -> tuple[Object, ...]:
     except InputError as error:
         raise tables.at(where, error) from None
     if "mesh" in table:
+        name = arguments["path"].name
+        for what, ones in (("light", made.lights), ("camera", made.cameras)):
+            note_unused(name, len(ones), what, ": a scene file has its own")
         found: tuple[Object, ...] = tables.call(
-            objects_of, {"file": made, "chosen": chosen, "where": arguments["path"].name, **values}, where
+            objects_of, {"file": made, "chosen": chosen, "where": name, **values}, where
         )
         return found
     material = DEFAULT_MATERIAL if chosen is None else chosen.material
