@@ -1,20 +1,32 @@
-"""The render mesh and its atlas: when a file's texture coordinates serve, and what xatlas makes else."""
+"""The render mesh and its atlas: when a file's texture coordinates serve, and what each library makes else."""
 
 from __future__ import annotations
 
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 from atlases import box, cylinder, icosphere, sheet
 
+from wgsss.bake import atlas
+from wgsss.bake.atlas import LIBRARIES, VARIABLE
 from wgsss.bake.charts import INSIDE, charts
 from wgsss.bake.unwrap import Surface, is_unique, split, unwrap
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
 from wgsss.scene import Mesh
 from wgsss.scene.mesh import load_mesh
+
+
+@pytest.fixture(params=LIBRARIES)
+def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Unwraps by one library after the other."""
+    if not find_spec(request.param):
+        pytest.skip(f"{request.param} is not installed")
+    monkeypatch.setenv(VARIABLE, request.param)
+    return str(request.param)
 
 
 def joined(*meshes: Mesh) -> Mesh:
@@ -68,7 +80,7 @@ def test_split_only_splits(gpu: Gpu) -> None:
     assert not split(box()).atlas.any()
 
 
-def test_overlaps_are_found(gpu: Gpu) -> None:
+def test_overlaps_are_found(gpu: Gpu, library: str) -> None:
     left, right = sheet(np.eye(2) * 0.02, center=(0.25, 0.5)), sheet(np.eye(2) * 0.02, center=(0.75, 0.5))
     mirrored = sheet(np.diag([-0.02, 0.02]), center=(0.25, 0.5))
     apart, twice, mirror = joined(left, right), joined(left, left), joined(left, mirrored)
@@ -102,7 +114,7 @@ def test_coordinates_beyond_the_square_are_fitted(gpu: Gpu) -> None:
 
 
 @pytest.mark.parametrize("radius", [20, 1e-3, 1e4])
-def test_sphere(gpu: Gpu, radius: float) -> None:
+def test_sphere(gpu: Gpu, radius: float, library: str) -> None:
     from scipy.ndimage import distance_transform_edt
 
     mesh = icosphere(radius, 3)
@@ -119,13 +131,13 @@ def test_sphere(gpu: Gpu, radius: float) -> None:
         assert distance[others].min() > 8
 
 
-def test_same_atlas_every_time(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_same_atlas_every_time(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str) -> None:
     first = unwrap(gpu, icosphere(7, 3))
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
     np.testing.assert_array_equal(first.atlas, unwrap(gpu, icosphere(7, 3)).atlas)
 
 
-def test_faces_without_area(gpu: Gpu) -> None:
+def test_faces_without_area(gpu: Gpu, library: str) -> None:
     mesh = icosphere(10, 2)
     with_sliver = Mesh(mesh.positions, np.concatenate([mesh.faces, [[0, 1, 1]]]))
     surface = unwrap(gpu, with_sliver)
@@ -139,14 +151,47 @@ def test_faces_without_area(gpu: Gpu) -> None:
     ("file", "faces", "own"),
     [("lee_perry_smith/LeePerrySmith.obj", None, True), ("spot.obj", None, True), ("bunny_stanford.ply", 6000, False)],
 )
-def test_scans(gpu: Gpu, data: Path, file: str, faces: int | None, own: bool) -> None:
+def test_scans(gpu: Gpu, library: str, data: Path, file: str, faces: int | None, own: bool) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of repairs
         mesh = load_mesh(data / file, size_mm=300).mesh
-    if faces:  # an open piece; all of it takes xatlas ten seconds
+    if faces:  # an open piece; all of it takes xatlas half a minute
         used, index = np.unique(mesh.faces[:faces], return_inverse=True)
         mesh = Mesh(mesh.positions[used], index.reshape(-1, 3))
     surface = unwrap(gpu, mesh)
     check(mesh, surface)
     assert is_unique(gpu, mesh, surface.atlas[surface.faces])
     assert own == (mesh.corner_uvs is not None and surface.charts.max() < 20)
+
+
+def test_many_separate_pieces_share_one_page(gpu: Gpu, library: str) -> None:
+    random = np.random.default_rng(4)
+    corners = (10 * random.normal(size=(1500, 1, 3)) + random.normal(size=(1500, 3, 3))).reshape(-1, 3)
+    mesh = Mesh(corners, np.arange(4500).reshape(-1, 3))
+    surface = unwrap(gpu, mesh)
+    check(mesh, surface)
+    assert surface.charts.max() + 1 == 1500
+    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+
+
+def test_the_library_is_chosen_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    def installed(*names: str) -> None:
+        monkeypatch.setattr(atlas, "find_spec", lambda name: name in names or None)
+
+    monkeypatch.delenv(VARIABLE, raising=False)
+    installed("xatlas", "uvunwrap")
+    assert atlas.library() == "xatlas"
+    monkeypatch.setenv(VARIABLE, "uvunwrap")
+    assert atlas.library() == "uvunwrap"
+    installed("xatlas")
+    with pytest.raises(InputError, match=r"install the Python package uvunwrap$"):
+        atlas.library()
+    monkeypatch.setenv(VARIABLE, "xatlsa")
+    with pytest.raises(InputError, match=r"unknown library in \$WGSSS_UNWRAP 'xatlsa'; did you mean 'xatlas'"):
+        atlas.library()
+    monkeypatch.setenv(VARIABLE, "")
+    installed("uvunwrap")
+    assert atlas.library() == "uvunwrap"
+    installed()
+    with pytest.raises(InputError, match=r"install the Python package xatlas or uvunwrap$"):
+        atlas.library()

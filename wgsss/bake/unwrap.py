@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake.atlas import library, new_atlas
 from wgsss.bake.cache import Arrays, cached
-from wgsss.errors import InputError
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.scene.mesh import Mesh
@@ -22,9 +22,6 @@ MAX_SHARE = 1e-3
 """Share of covered texels that may overlap, and of the surface that may be without texels: rounding, not design."""
 MARGIN = 1e-4
 """How far texture coordinates may leave the unit square before they are fitted into it."""
-PADDING = 5
-"""Empty texels around each chart where the atlas is about 1024 to 1300 texels wide, the size that xatlas aims at: at
-least 8 between two charts at 1024, and 4 at 512."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +45,19 @@ class Surface:
 
 
 def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
-    """The render mesh of `mesh`, cached. Its own texture coordinates are the atlas where they are unique, else xatlas
-    makes one.
+    """The render mesh of `mesh`, cached. Its own texture coordinates are the atlas where they are unique, else a
+    new one is made: see `atlas.py`.
 
     Raises InputError where the mesh has no face with an area.
     """
-    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors]
+    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors, library()]
 
     def make() -> Arrays:
         surface = _unwrap(gpu, mesh)
         return {f.name: getattr(surface, f.name) for f in fields(Surface)}
 
     label = f"unwrapping {len(mesh.faces)} faces"
-    return Surface(**cached("unwrap", key, make, code=[Mesh, "bake/atlas_faces"], label=label))
+    return Surface(**cached("unwrap", key, make, code=[Mesh, new_atlas, "bake/atlas_faces"], label=label))
 
 
 def split(mesh: Mesh) -> Surface:
@@ -71,7 +68,7 @@ def split(mesh: Mesh) -> Surface:
 def _unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
     atlas = None if mesh.corner_uvs is None else _fitted(mesh.corner_uvs)
     if atlas is None or not is_unique(gpu, mesh, atlas):
-        atlas = _xatlas(mesh)
+        atlas = new_atlas(mesh)
     surface = _render_mesh(mesh, atlas)
     charts = _components(atlas_vertices(surface.vertex, surface.atlas)[surface.faces])
     return replace(surface, charts=charts)
@@ -127,47 +124,6 @@ def _fitted(uvs: Array) -> Array:
     if low.min() < -MARGIN or high.max() > 1 + MARGIN:
         uvs = (uvs - low) / np.maximum(high - low, np.finfo(np.float32).tiny)
     return np.clip(uvs, 0, 1)
-
-
-def _xatlas(mesh: Mesh) -> Array:
-    """float32 (F, 3, 2): an atlas that fills the unit square."""
-    import xatlas
-
-    size = np.ptp(mesh.bounds, axis=0).max()
-    twice_areas = np.linalg.norm(mesh.face_normals, axis=1)
-    if not (size > 0 and twice_areas.max() > 1e-12 * size * size):
-        raise InputError(f"{mesh.name}: no face has an area, so the mesh cannot be unwrapped")
-    # xatlas compares areas with absolute thresholds: faces much smaller than 1 would end up as hundreds of charts.
-    unit = np.sqrt(np.median(twice_areas[twice_areas > 0]))
-    pack = xatlas.PackOptions()
-    pack.padding = PADDING
-    pack.resolution = 0  # one page, however large
-    atlas = xatlas.Atlas()
-    atlas.add_mesh((_smoothed(mesh) / unit).astype(np.float32), mesh.faces.astype(np.uint32))
-    atlas.generate(xatlas.ChartOptions(), pack)
-    _, faces, uvs = atlas.get_mesh(0)
-    if not atlas.chart_count or len(faces) != len(mesh.faces):
-        raise InputError(f"{mesh.name}: the mesh cannot be unwrapped")
-    # The page is not square: stretched to fill the map, with room for the gutters along its rim.
-    page = np.array([atlas.width, atlas.height])
-    return ((uvs * page + PADDING) / (page + 2 * PADDING)).astype(np.float32)[faces]
-
-
-def _smoothed(mesh: Mesh) -> Array:
-    """float64 (V, 3): positions moved a little along their normals towards the mean of their neighbours, mm. On rough
-    scans that saves a third of the charts; what it distorts, the stretch of the true surface accounts for."""
-    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]).T
-    degree = np.maximum(np.bincount(ends.reshape(-1), minlength=len(mesh.positions)), 1)
-    smooth = mesh
-    for _ in range(2):
-        positions, normals = smooth.positions.astype(np.float64), smooth.normals.astype(np.float64)
-        total = np.zeros_like(positions)
-        for a, b in (ends, ends[::-1]):
-            for axis in range(3):
-                total[:, axis] += np.bincount(a, positions[b, axis], len(positions))
-        step = np.einsum("ij,ij->i", total / degree[:, None] - positions, normals)
-        smooth = mesh.deformed(positions + 0.5 * step[:, None] * normals)
-    return smooth.positions.astype(np.float64) - mesh.bounds[0]
 
 
 def _distinct(columns: list[Array]) -> tuple[Array, Array]:

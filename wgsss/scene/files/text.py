@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.images import require_file
+from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
