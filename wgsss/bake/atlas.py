@@ -84,7 +84,8 @@ def _uvunwrap(positions: Array, faces: Array) -> Array | None:
     options: dict[str, Any] = {"padding": PADDING, "packing": "fast"}
     meshes = [uvunwrap.Mesh(positions, faces)]
     atlas = uvunwrap.generate(meshes, page_size=_SIDE, **options)
-    if atlas.chart_count and (atlas.page_count > 1 or atlas.utilization < _FILLED):  # of so many charts, gutters would take up most
+    # Gutters would take up most of the page where there are very many charts.
+    if atlas.chart_count and (atlas.page_count > 1 or atlas.utilization < _FILLED):
         a, b, c = positions[faces].astype(np.float64).transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0
         density = _SIDE * float(np.sqrt(0.5 / area))
