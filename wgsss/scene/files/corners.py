@@ -56,5 +56,5 @@ def finite_normals(normals: Array, notes: list[str]) -> Array:
 
 def _finite(values: Array) -> Array:
     with np.errstate(over="ignore"):
-        finite: Array = np.isfinite(values.astype(np.float32)).all(axis=1, keepdims=True)
+        finite = np.asarray(np.isfinite(values.astype(np.float32)).all(axis=1, keepdims=True))
     return finite
