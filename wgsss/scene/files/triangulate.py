@@ -19,6 +19,7 @@ Array = npt.NDArray[Any]
 
 STRAIGHT = 1e-5  # height over length of the triangle of three corners, below which they lie on a line
 MAX_CORNERS = 100_000  # of a face that is not convex: the time of ear clipping may grow with their square
+UNCUT = 1e-6  # share of a polygon's area that rounding may leave out
 
 
 def triangulate(path: Path, positions: Array, corners: Array, counts: Array, notes: list[str]) -> tuple[Array, Array]:
@@ -99,8 +100,11 @@ def _clipped(plane: Array, straight: Array) -> Array:
         return _fan(count)
     ends = np.array([len(ring)], np.uint32)
     cut = mapbox_earcut.triangulate_float64(np.ascontiguousarray(plane[ring]), ends).reshape(-1, 3)
-    if not len(cut):
-        return _fan(count)  # without an area, which is for the caller to find
+    missing = abs(_area(plane) - sum(_area(plane[ring[corners]]) for corners in cut))
+    if not len(cut) or missing > UNCUT * _area(plane):
+        # Without an area, which is for the caller to find; or its sides cross, as those of a quad that is far from
+        # flat may do. A fan then leaves no hole.
+        return _fan(count)
     triangles = ring[cut]
     if len(ring) == count:
         return triangles
@@ -118,3 +122,9 @@ def _clipped(plane: Array, straight: Array) -> Array:
         else:
             done.append(triangle)
     return np.array(done)
+
+
+def _area(plane: Array) -> float:
+    """Of a polygon (N, 2) whose sides do not cross; of others a part counts against another."""
+    x, y = (plane - plane[0]).T
+    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
