@@ -108,7 +108,7 @@ class _Material:
         if words[:1] == ["-halo"]:  # of `d`: less opaque where the surface faces the camera
             del words[0]
         try:
-            r, g, b = map(float, words[:3] if len(words) > 2 else words[:1] * 3)
+            r, g, b = map(float, words * 3 if len(words) == 1 else words[:3])
             if math.isfinite(r + g + b):
                 return r, g, b
         except ValueError:

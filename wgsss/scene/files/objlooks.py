@@ -27,27 +27,27 @@ def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: l
     for row in libraries:
         for file in _files(text.rest(row), text.path.parent, notes):
             try:
-                found, more = read_materials(file)
+                more_looks, more_notes = read_materials(file)
             except InputError as error:
                 notes.append(f"materials left out: {error}")
                 continue
-            looks = {**found, **looks}  # of two with one name the first counts
-            notes += more
+            looks = {**more_looks, **looks}  # of two with one name the first counts
+            notes += more_notes
     by_short_name = {without_comment(name): look for name, look in looks.items()}
 
     names = [text.rest(row) for row in uses]
-    number: dict[str, int] = {}
-    result, unknown = [Look()], []
+    of_name: dict[str, Look] = {}
+    unknown = []
     for name in dict.fromkeys(names):
-        look = looks.get(name) or by_short_name.get(without_comment(name))
-        if look is None:
+        found = looks.get(name) or by_short_name.get(without_comment(name))
+        if found is None:
             unknown.append(shown(name))
-        number[name] = len(result)
-        result.append(look or Look(without_comment(name)))
+        of_name[name] = found or Look(without_comment(name))
     if unknown:
         listed = ", ".join(unknown[:3]) + (f" and {len(unknown) - 3} more" if len(unknown) > 3 else "")
         notes.append(f"no .mtl file describes material{'s' * (len(unknown) > 1)} {listed}")
-    of_use = np.array([0, *(number[name] for name in names)])
+    result = list(dict.fromkeys([Look(), *of_name.values()]))
+    of_use = np.array([0, *(result.index(of_name[name]) for name in names)])
     return result, of_use[np.searchsorted(uses, faces)]
 
 

@@ -59,6 +59,8 @@ def read_off(path: Path) -> Contents:
 
     notes: list[str] = []
     part = _vertices(text, vertex_rows, keyword, notes)
+    if there > vertex_count + face_count:
+        notes.append(f"{there - vertex_count - face_count} lines after the last face are left out")
     corners, sizes = _corners(text, face_rows, vertex_count, notes)
     triangles = triangulate(path, part.positions, corners, sizes, notes)[0]
     splits = bool(part.uvs) or part.normals is not None

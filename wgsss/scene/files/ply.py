@@ -39,10 +39,10 @@ def read_ply(path: Path) -> Contents:
     """
     data = file_bytes(path)
     header = read_header(path, data)
-    tables = read_tables(path, data, header)
+    notes: list[str] = []
+    tables = read_tables(path, data, header, notes)
     element = next((e for e in header.elements if e.name in ("vertex", "vertices")), Element("vertex", 0))
     vertices = tables.get(element.name, {})
-    notes: list[str] = []
     # What is used is taken out of the tables, so that what is there in the end was left out.
     positions = _taken(vertices, ("x", "y", "z"))
     if positions is None:

@@ -31,20 +31,20 @@ class Lists:
 Table = dict[str, Array | Lists]
 
 
-def read_tables(path: Path, data: bytes, header: Header) -> dict[str, Table]:
+def read_tables(path: Path, data: bytes, header: Header, notes: list[str]) -> dict[str, Table]:
     """The rows of each element by its name; of two with one name the first counts, and so of properties.
 
     Numbers are float64 in an ASCII file, and of their own types in a binary one. Raises InputError, naming the line or
     the element, where the file is damaged or truncated.
     """
     tables: dict[str, Table] = {}
-    rows = _binary(path, data, header) if header.order else _ascii(path, data, header)
+    rows = (_binary if header.order else _ascii)(path, data, header, notes)
     for element, table in zip(header.elements, rows, strict=True):
         tables.setdefault(element.name, table)
     return tables
 
 
-def _ascii(path: Path, data: bytes, header: Header) -> Iterator[Table]:
+def _ascii(path: Path, data: bytes, header: Header, notes: list[str]) -> Iterator[Table]:
     text = Text(path, data[header.size :], first_line=header.lines + 1)
     row = 0
     for element in header.elements:
@@ -62,9 +62,11 @@ def _ascii(path: Path, data: bytes, header: Header) -> Iterator[Table]:
             raise text.error(edges[misfit], f"its numbers do not fit the properties of element {shown(element.name)}")
         yield table
         row += count
+    if row < len(text.widths):
+        notes.append(f"{len(text.widths) - row} lines after the last element are left out")
 
 
-def _binary(path: Path, data: bytes, header: Header) -> Iterator[Table]:
+def _binary(path: Path, data: bytes, header: Header, notes: list[str]) -> Iterator[Table]:
     at = header.size
     for element in header.elements:
 
@@ -77,6 +79,8 @@ def _binary(path: Path, data: bytes, header: Header) -> Iterator[Table]:
             raise InputError(f"{path}: damaged: row {misfit + 1} of element {shown(element.name)}")
         yield table
         at = int(edges[-1])
+    if data[at:].strip():
+        notes.append(f"{len(data) - at} bytes after the last element are left out")
 
 
 def _size(type_: str) -> int:

@@ -71,5 +71,7 @@ def _ascii(path: Path, data: bytes, notes: list[str]) -> tuple[Array, Array]:
         raise text.error(text.first[loops[bad[0]]], f"a loop of {counts[bad[0]]} vertices")
     if not text.row_starts_with(b"endsolid").any():
         notes.append("the file may be truncated: it does not end with 'endsolid'")
+    if not len(loops):
+        return np.empty((0, 3)), np.empty((0, 3), np.int64)
     positions = text.table(rows, 3, 3)[0]
     return positions, triangulate(path, positions, np.arange(len(positions)), counts, notes)[0]
