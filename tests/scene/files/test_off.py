@@ -119,7 +119,7 @@ def test_what_is_left_out_is_noted(tmp_path: Path) -> None:
         (off(vertices=["0 0", *VERTICES[1:]]), "line 3: 2 numbers where there must be at least 3"),
         (off(vertices=["0 0 x", *VERTICES[1:]]), "line 3: 'x' is not a number"),
         (off("COFF\n4 1 0"), "line 3: 3 numbers where there must be at least 6"),
-        (off("OFF\n4 0 0", faces=[]), "the mesh is empty: no face has three corners"),
+        (off("OFF\n4 0 0", faces=[]), "the mesh is empty: it has no faces"),
     ],
 )
 def test_damage_is_one_line_that_says_where(tmp_path: Path, text: str | bytes, message: str) -> None:

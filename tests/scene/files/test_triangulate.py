@@ -93,10 +93,21 @@ def test_the_corners_of_many_faces_keep_their_order() -> None:
     assert notes == ["1 faces of fewer than three corners are left out"]
 
 
-def test_star_that_turns_twice_is_no_convex_polygon() -> None:
+def test_polygons_that_cross_themselves_keep_all_their_edges() -> None:
     angles = np.arange(5) * 4 * np.pi / 5
-    areas, _ = split(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1))
-    assert np.abs(areas[:, 2]).sum() < 2.5  # a fan would cover 2.8
+    star = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    folded = np.array([(0, 0, 0), (0.49, 0.25, 0), (0.5, 0.246, 0), (0.02, 0.12, 0.05)])
+    for polygon in (star, folded, flat((0, 0), (1, 1), (1, 0), (0, 1)), flat((0, 0), (2, 0), (2, 2), (1, -1), (0, 2))):
+        count = len(polygon)
+        triangles, _ = triangulate(FILE, polygon, np.arange(count), np.array([count]), [])
+        edges = {(int(t[i]), int(t[i - 2])) for t in triangles for i in range(3)}
+        assert len(triangles) == count - 2 and {(i, (i + 1) % count) for i in range(count)} <= edges
+
+
+def test_a_folded_quad_is_split_where_its_triangles_are_smaller() -> None:
+    areas, _ = split([(0, 0, 0), (1, 1, 0), (1, 0, 0.1), (0, 1, 0.1)])
+    other, _ = split([(1, 1, 0), (1, 0, 0.1), (0, 1, 0.1), (0, 0, 0)])
+    np.testing.assert_allclose(*(np.linalg.norm(a, axis=1).sum() for a in (areas, other)))
 
 
 @pytest.mark.parametrize(
@@ -118,7 +129,7 @@ def test_polygons_beyond_help_come_to_an_end(polygon: np.ndarray) -> None:
 
 def test_repeated_corners_are_left_out() -> None:
     areas, _ = split(flat((0, 0), (0, 0), (1, 0), (1, 1), (1, 1), (0, 1)))
-    assert areas[:, 2].sum() == 1.0
+    assert len(areas) == 2 and areas[:, 2].sum() == 1.0
 
 
 def test_large_polygons_take_little_time() -> None:
@@ -141,3 +152,5 @@ def test_a_face_that_would_take_too_long_is_refused() -> None:
 def test_no_face_of_three_corners() -> None:
     with pytest.raises(InputError, match="no face has three corners"):
         split(flat((0, 0), (1, 0)))
+    with pytest.raises(InputError, match="it has no faces"):
+        triangulate(FILE, np.zeros((3, 3)), np.empty(0, np.int64), np.empty(0, np.int64), [])

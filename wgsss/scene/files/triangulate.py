@@ -18,8 +18,8 @@ from wgsss.errors import InputError
 Array = npt.NDArray[Any]
 
 STRAIGHT = 1e-5  # height over length of the triangle of three corners, below which they lie on a line
+MAX_FANS = 300  # of which the one with the least area is looked for
 MAX_CORNERS = 100_000  # of a face that is not convex: the time of ear clipping may grow with their square
-UNCUT = 1e-6  # share of a polygon's area that rounding may leave out
 
 
 def triangulate(path: Path, positions: Array, corners: Array, counts: Array, notes: list[str]) -> tuple[Array, Array]:
@@ -30,6 +30,8 @@ def triangulate(path: Path, positions: Array, corners: Array, counts: Array, not
     triangles without one. Raises InputError, naming the file, where no face is left, and for a face of more than
     MAX_CORNERS that is not convex.
     """
+    if not len(counts):
+        raise InputError(f"{path}: the mesh is empty: it has no faces")
     short = np.count_nonzero(counts < 3)
     if short == len(counts):
         raise InputError(f"{path}: the mesh is empty: no face has three corners")
@@ -53,7 +55,7 @@ def triangulate(path: Path, positions: Array, corners: Array, counts: Array, not
         for i in np.flatnonzero(clip):
             if count > MAX_CORNERS:
                 raise InputError(f"{path}: a face of {count} corners is too large")
-            cut = _clipped(plane[i], straight[i])
+            cut = _clipped(positions[corners[places[i]]], plane[i], straight[i])
             triangles.append(places[i][cut])
             faces.append(np.full(len(cut), of_this_size[i]))
     order = np.argsort(np.concatenate(faces), kind="stable")
@@ -63,6 +65,19 @@ def triangulate(path: Path, positions: Array, corners: Array, counts: Array, not
 def _fan(count: int) -> Array:
     after = np.arange(1, count - 1)
     return np.stack([np.zeros_like(after), after, after + 1], axis=1)
+
+
+def _least_fan(points: Array) -> Array:
+    """The fan from that corner of a polygon (N, 3) from which its triangles have the least area."""
+    count = len(points)
+    if count > MAX_FANS:
+        return _fan(count)
+    fans = (np.arange(count)[:, None, None] + _fan(count)) % count
+    a, b, c = (points[fans[..., i]] for i in range(3))
+    with np.errstate(all="ignore"):
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=2).sum(axis=1)
+    least: Array = fans[area.argmin()]
+    return least
 
 
 def _flattened(points: Array) -> tuple[Array, Array, Array]:
@@ -92,19 +107,22 @@ def _flattened(points: Array) -> tuple[Array, Array, Array]:
         return plane, straight, ~convex & np.isfinite(plane).all(axis=(1, 2))
 
 
-def _clipped(plane: Array, straight: Array) -> Array:
-    """Triangles int64 (T, 3) of one polygon (N, 2), counter-clockwise."""
+def _clipped(points: Array, plane: Array, straight: Array) -> Array:
+    """Triangles int64 (T, 3) of one polygon (N, 3), which is counter-clockwise in a plane (N, 2).
+
+    All its edges are edges of triangles, even where it crosses itself in that plane, so that no hole opens beside it.
+    """
     count = len(plane)
+    distinct = np.flatnonzero((points != np.roll(points, 1, axis=0)).any(axis=1))
+    if 3 <= len(distinct) < count:
+        return distinct[_clipped(points[distinct], plane[distinct], straight[distinct])]
     ring = np.flatnonzero(~straight)
-    if len(ring) < 3:
-        return _fan(count)
+    if len(ring) < 3 or len(distinct) < 3:
+        return _fan(count)  # without an area, which is for the caller to find
     ends = np.array([len(ring)], np.uint32)
     cut = mapbox_earcut.triangulate_float64(np.ascontiguousarray(plane[ring]), ends).reshape(-1, 3)
-    missing = abs(_area(plane) - sum(_area(plane[ring[corners]]) for corners in cut))
-    if not len(cut) or missing > UNCUT * _area(plane):
-        # Without an area, which is for the caller to find; or its sides cross, as those of a quad that is far from
-        # flat may do. A fan then leaves no hole.
-        return _fan(count)
+    if len(cut) < len(ring) - 2:
+        cut = _least_fan(points[ring])
     triangles = ring[cut]
     if len(ring) == count:
         return triangles
@@ -122,9 +140,3 @@ def _clipped(plane: Array, straight: Array) -> Array:
         else:
             done.append(triangle)
     return np.array(done)
-
-
-def _area(plane: Array) -> float:
-    """Of a polygon (N, 2) whose sides do not cross; of others a part counts against another."""
-    x, y = (plane - plane[0]).T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
