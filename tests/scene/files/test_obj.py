@@ -209,7 +209,9 @@ def test_materials_become_parts(tmp_path: Path) -> None:
 
 def test_materials_that_are_not_there(tmp_path: Path) -> None:
     contents = read(tmp_path, "mtllib gone.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
-    assert contents.notes == ("the material file 'gone.mtl' is not there", "no .mtl file describes materials a, b")
+    assert contents.notes == ("the material file 'gone.mtl' is not there",)
+    contents = read(tmp_path, SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
+    assert contents.notes == ("no .mtl file describes materials a, b",)
     assert [part.look.name for part in contents.parts] == ["a", "b"]
 
 

@@ -21,11 +21,12 @@ Array = npt.NDArray[Any]
 def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: list[str]) -> tuple[list[Look], Array]:
     """Looks, and which of them each face has (F,), given the rows of mtllib, usemtl and faces.
 
-    A material that no .mtl file has is a look without properties, which a note names, as one does a missing file.
+    A note names each .mtl file that is not there, or else the materials that none describes; their looks are plain.
     """
     looks: dict[str, Look] = {}
+    missing: list[str] = []
     for row in libraries:
-        for file in _files(text.rest(row), text.path.parent, notes):
+        for file in _files(text.rest(row), text.path.parent, missing):
             try:
                 more_looks, more_notes = read_materials(file)
             except InputError as error:
@@ -43,15 +44,16 @@ def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: l
         if found is None:
             unknown.append(shown(name))
         of_name[name] = found or Look(without_comment(name))
-    if unknown:
+    notes += [f"the material file '{shown(name)}' is not there" for name in missing]
+    if unknown and not missing:
         listed = ", ".join(unknown[:3]) + (f" and {len(unknown) - 3} more" if len(unknown) > 3 else "")
         notes.append(f"no .mtl file describes material{'s' * (len(unknown) > 1)} {listed}")
-    result = list(dict.fromkeys([Look(), *of_name.values()]))
-    of_use = np.array([0, *(result.index(of_name[name]) for name in names)])
-    return result, of_use[np.searchsorted(uses, faces)]
+    number: dict[Look, int] = {}
+    of_use = np.array([number.setdefault(look, len(number)) for look in (Look(), *map(of_name.__getitem__, names))])
+    return list(number), of_use[np.searchsorted(uses, faces)]
 
 
-def _files(names: str, folder: Path, notes: list[str]) -> list[Path]:
+def _files(names: str, folder: Path, missing: list[str]) -> list[Path]:
     """The files that a mtllib statement names: one, whose name may hold blanks, or several."""
     for whole in (names, without_comment(names)):
         file = locate(whole.strip('"'), folder)
@@ -65,5 +67,5 @@ def _files(names: str, folder: Path, notes: list[str]) -> list[Path]:
         if file:
             files.append(file)
         else:
-            notes.append(f"the material file '{shown(name)}' is not there")
+            missing.append(name)
     return files
