@@ -70,7 +70,7 @@ class Stage:
 
     @property
     def lights(self) -> list[Light]:
-        """The scene's lights and the suns of its environments. Of these, the other part is not among them."""
+        """The scene's lights, followed by the suns of its environments."""
         return [*self.scene.lights, *self.environment.suns]
 
     @property

@@ -252,7 +252,7 @@ def test_what_is_no_regular_file_is_refused_unopened(tmp_path: Path) -> None:
         "link.png": "not a regular file",
         "folder.png": "a folder",
         "lost.png": "no such file",
-        "\0.png": "cannot be read",
+        "\0.png": "not the name of a file",
         "a" * 300: "cannot be read",
     }.items():
         with pytest.raises(InputError, match=said):

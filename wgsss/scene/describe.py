@@ -11,7 +11,7 @@ import numpy as np
 from wgsss.errors import InputError, Note
 from wgsss.scene.animation import NONE
 from wgsss.scene.files import SUFFIXES, read_file
-from wgsss.scene.images import read_radiance
+from wgsss.scene.images import read_sky
 from wgsss.scene.light import EnvironmentLight
 from wgsss.scene.loading import load_scene
 from wgsss.scene.material import SLOTS, Material
@@ -80,7 +80,7 @@ def _scene_file(path: Path) -> Described:
 
 
 def _sky(path: Path) -> Described:
-    pixels = read_radiance(path)
+    pixels = read_sky(path)
     height, width = pixels.shape[:2]
     # Rows of a latitude-longitude image cover less of the sphere the nearer they are to a pole.
     weights = np.sin((np.arange(height) + 0.5) / height * np.pi)

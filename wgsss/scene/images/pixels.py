@@ -51,11 +51,12 @@ def read_pixels(source: str | Path | bytes) -> Array:
         require_file(Path(source))
     try:
         data = source if isinstance(source, bytes) else Path(source).read_bytes()
-        return _decoded(data, tga=not isinstance(source, bytes) and Path(source).suffix.lower() in _TGA)
+        pixels = _decoded(data, tga=not isinstance(source, bytes) and Path(source).suffix.lower() in _TGA)
     except InputError as error:
         raise InputError(f"{named(source)}{error}") from None
     except OSError as error:
         raise InputError(f"{named(source)}cannot be read ({error.strerror or error})") from None
+    return _unit_range(pixels, named(source))
 
 
 def named(source: str | Path | bytes) -> str:
@@ -74,7 +75,7 @@ def _decoded(data: bytes, tga: bool) -> Array:
             raise
         except Exception:  # decoders raise whatever their damaged data makes them stumble over
             raise InputError("damaged, or not an image") from None
-    return _unit_range(pixels)
+    return pixels
 
 
 @contextmanager
@@ -164,7 +165,7 @@ def _read_tiff(data: bytes) -> Array | None:
     return pixels.reshape(*pixels.shape[:2], -1)[..., : colours + has_alpha]
 
 
-def _unit_range(pixels: Array) -> Array:
+def _unit_range(pixels: Array, where: str) -> Array:
     """uint8, uint16 or float32 (H, W, C) from numbers of any type; integers with a sign have no use for it."""
     pixels = pixels if pixels.ndim == 3 else pixels[..., None]
     if pixels.dtype in (np.uint8, np.uint16):
@@ -174,7 +175,7 @@ def _unit_range(pixels: Array) -> Array:
     if pixels.dtype.kind == "b":
         return pixels.astype(np.uint8) * 255
     if pixels.min() < 0:
-        warnings.warn("values below 0 in an image of signed integers count as 0", Note, stacklevel=2)
+        warnings.warn(f"{where}values below 0 in an image of signed integers count as 0", Note, stacklevel=2)
     if pixels.dtype.itemsize == 4 and pixels.max() <= 65535:  # how 16 bits are kept by those who have no such type
         return np.clip(pixels, 0, 65535).astype(np.uint16)
     largest = np.iinfo(pixels.dtype).max
