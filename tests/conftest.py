@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,9 @@ from wgsss.gpu import Gpu, default_gpu
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("WGSSS_DATA", ROOT.parent / "shared" / "data"))
+
+HAS_FLIP = find_spec("flip_evaluator") is not None
+needs_flip = pytest.mark.skipif(not HAS_FLIP, reason="flip-evaluator is not installed")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -253,6 +253,15 @@ def test_methods_can_be_hidden(tab: browser.Page) -> None:
     assert tab.run(f"{MARKS}.length") == len(SWEEPS)
 
 
+def test_the_page_says_why_there_is_no_flip(tab: browser.Page, drawn: Path, tmp_path: Path) -> None:
+    run = made("lambert", 5.0, 0.3)
+    draw([{**run, "error": {**run["error"], "flip": None, "flip_reason": "it is not installed"}}], tmp_path)
+    tab.open((tmp_path / "chart.html").as_uri())
+    tab.run(CHOOSE % "flip")
+    assert "it is not installed" in tab.run("document.getElementById('panels').textContent")
+    tab.open((drawn / "chart.html").as_uri())
+
+
 @pytest.mark.parametrize(("metric", "direction"), [("psnr", "up"), ("flip", "down"), ("bias", "down")])
 def test_another_error_can_be_chosen(metric: str, direction: str, tab: browser.Page) -> None:
     tab.run(CHOOSE % metric)

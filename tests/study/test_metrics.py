@@ -7,9 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from conftest import needs_flip
 
 from wgsss.errors import InputError, RenderError
-from wgsss.study.metrics import error_map, errors, luminance, over_black
+from wgsss.study import metrics
+from wgsss.study.metrics import NO_FLIP, error_map, errors, luminance, over_black
 
 SEEN = np.ones((2, 2), bool)
 REFERENCE = np.array([[1.0, 2.0], [2.0, 4.0]])[..., None] * np.ones(3)  # mean square 25/4, mean 9/4, maximum 4
@@ -63,6 +65,7 @@ def test_floor_is_the_references_own_error():
     assert found.floor == pytest.approx(0.2)
 
 
+@needs_flip
 def test_flip_is_the_mean_over_what_is_seen():
     side, seen = 32, np.zeros((32, 32), bool)
     seen[8:24, 8:24] = True
@@ -76,6 +79,15 @@ def test_flip_is_the_mean_over_what_is_seen():
     found = errors(M, M, seen, display=inside, reference_display=black).flip
     whole = errors(M, M, np.ones_like(seen), display=inside, reference_display=black).flip
     assert found is not None and whole is not None and found > 0.8 and whole < 0.6 * found
+
+
+def test_where_flip_is_not_installed_the_reason_is_given(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(metrics, "find_spec", lambda name: None)
+    picture = np.zeros((2, 2, 3), np.uint8)
+    found = errors(REFERENCE, REFERENCE, SEEN, display=picture, reference_display=picture)
+    assert (found.flip, found.flip_reason, found.rel_rmse) == (None, NO_FLIP, 0.0)
+    assert found.json()["flip"] is None and found.json()["flip_reason"] == NO_FLIP
+    assert "flip_reason" not in errors(REFERENCE, REFERENCE, SEEN).json()
 
 
 def test_coverage_is_over_black():

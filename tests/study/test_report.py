@@ -17,11 +17,12 @@ from PIL import Image as Picture
 from scenes import lit
 from standins import Scaled
 
+from wgsss import __version__
 from wgsss.errors import InputError
 from wgsss.reference import REFERENCES
 from wgsss.scene import DirectionalLight
 from wgsss.study import compare as module
-from wgsss.study import error_maps
+from wgsss.study import error_maps, report
 from wgsss.study.causes import CAUSES, Causes
 from wgsss.study.compare import Comparison, compare
 from wgsss.study.report import OWN, check_folder, page, write_report
@@ -67,6 +68,15 @@ def test_files(comparison, folder):
     assert [run["error"]["rel_rmse"] for run in numbers["methods"]] == pytest.approx([0.2, 0.04], rel=1e-4)
     assert numbers["lights"]["directional"][0]["error"]["bias"] == pytest.approx(0.8, rel=1e-4)
     assert numbers["causes"]["lambert"]["part"]["profile"] == -0.1
+
+
+def test_versions_say_what_is_not_installed(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(report, "_PACKAGES", ("numpy", "no-such-package"))
+    assert report.versions() == {
+        "wgsss": __version__,
+        "numpy": np.__version__,
+        "no-such-package": "not installed",
+    }
 
 
 def test_linear_images_hold_M(comparison, folder):

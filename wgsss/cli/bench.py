@@ -119,7 +119,7 @@ def _row(run: dict[str, Any]) -> list[str]:
         f"{run['bytes'] / 1e6:.1f}",
         _number(error["rel_rmse"], 100.0, "{:.3g}"),
         _number(error["psnr"], 1.0, "{:.1f}"),
-        _number(error["flip"], 1.0, "{:.4f}"),
+        "not installed" if error.get("flip_reason") else _number(error["flip"], 1.0, "{:.4f}"),
         _number(error["bias"], 1.0, "{:.3f}"),
     ]
 

@@ -8,7 +8,11 @@ from typing import Any
 from wgsss.cli import arguments
 from wgsss.errors import InputError
 
-_PACKAGES = ("wgpu", "numpy", "scipy", "trimesh", "xatlas", "OpenEXR")
+_PACKAGES = (
+    *("wgpu", "numpy", "scipy", "scikit-image", "trimesh", "mapbox-earcut", "fast-simplification", "OpenEXR", "imageio"),
+    *("pillow", "matplotlib", "embreex", "libigl", "xatlas", "uvunwrap", "flip-evaluator", "mitsuba", "imgui-bundle"),
+    *("DracoPy", "meshopt"),
+)
 _FILE = "a mesh, a scene file (.toml) or an environment image (.hdr .exr)"
 
 
@@ -43,7 +47,7 @@ def _about_this_machine(args: Any) -> None:
         try:
             versions[package] = version(package)
         except PackageNotFoundError:
-            versions[package] = "missing"
+            versions[package] = "not installed"
     found = [{key: a.info[key] for key in ("device", "adapter_type", "description", "vendor")} for a in adapters()]
     sizes = cache.entries().values()
     result: dict[str, Any] = {

@@ -4,7 +4,9 @@ const percent = v => `${+(100 * v).toPrecision(3)} %`, plain = v => `${+v.toPrec
 // Less is better in all but `up`; `of` gives null where a run has no such figure, or one that the scale cannot show.
 const METRICS = {
   rel_rmse: { name: "relative RMSE of M", of: e => e.rel_rmse > 0 ? e.rel_rmse : null, log: true, form: percent },
-  flip: { name: "FLIP of the picture", of: e => e.flip > 0 ? e.flip : null, log: true, form: plain },
+  flip: {
+    name: "FLIP of the picture", of: e => e.flip > 0 ? e.flip : null, log: true, form: plain, why: e => e.flip_reason,
+  },
   bias: { name: "bias of M, either way", of: e => e.bias === null ? null : Math.abs(e.bias - 1) || null, log: true, form: percent },
   psnr: { name: "PSNR, dB", of: e => e.psnr, log: false, up: true, form: plain },
 };
@@ -83,7 +85,8 @@ function drawPanel(panel) {
   const shown = panel.runs.filter(run => metric.of(run.error) !== null);
   const runs = shown.filter(run => !hidden.has(run.method));
   const middle = { "text-anchor": "middle" };
-  if (!runs.length) return void svg(picture, "text", { x: WIDTH / 2, y: HEIGHT / 2, ...middle }, "nothing to show");
+  const why = panel.runs.map(run => metric.why?.(run.error)).find(Boolean) ?? "nothing to show";
+  if (!runs.length) return void svg(picture, "text", { x: WIDTH / 2, y: HEIGHT / 2, ...middle }, why);
   const floor = metric === METRICS.rel_rmse ? panel.floor : 0;
   const x = scale(shown.flatMap(run => [run.frame_ms, ...run.frame_ms_quartiles]), LEFT, WIDTH - RIGHT, true);
   const errors = shown.map(run => metric.of(run.error)).concat(floor > 0 ? [floor] : []);
@@ -161,7 +164,7 @@ function tell(run, mark) {
     html(made, "td", name);
     html(made, "td", value);
   };
-  const [low, high] = run.frame_ms_quartiles, { rel_rmse, psnr, flip, bias } = run.error;
+  const [low, high] = run.frame_ms_quartiles, { rel_rmse, psnr, flip, bias, flip_reason } = run.error;
   const or = (value, form) => value === null ? "–" : form(value);
   row("frame", `${plain(run.frame_ms)} ms (${plain(low)} to ${plain(high)}, ${run.frames} frames)`);
   const dearest = Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6);
@@ -171,7 +174,7 @@ function tell(run, mark) {
   row("relative RMSE", or(rel_rmse, percent));
   row("the reference's own", or(run.floor, percent), "sub");
   row("PSNR", or(psnr, v => `${plain(v)} dB`));
-  row("FLIP", or(flip, plain));
+  row("FLIP", flip_reason ?? or(flip, plain));
   row("bias", or(bias, plain));
   row("measured", `${run.date.slice(0, 10)}, ${run.version}`, "sub");
   tip.replaceChildren();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from wgsss.errors import InputError, RenderError
 
 Array = npt.NDArray[Any]
 
+NO_FLIP = "flip-evaluator is not installed"
+"""why there may be no FLIP: the package has no wheel for some machines and versions of Python"""
 _ROUNDING = 2.0**-20  # of the peak: what differs by less, differs by how sums in float32 were rounded
 
 
@@ -29,15 +32,19 @@ class Errors:
     bias: float | None
     """mean of the estimate over that of the reference: below 1 it is too dark"""
     flip: float | None
-    """mean FLIP of the tone-mapped images (Andersson et al. 2020), 0 to 1; None without images"""
+    """mean FLIP of the tone-mapped images (Andersson et al. 2020), 0 to 1; None without images, and where `flip_reason`
+    says why"""
     floor: float | None
     """the rel_rmse that the reference's own error accounts for"""
+    flip_reason: str | None = None
+    """why FLIP was asked for and is missing"""
 
-    def json(self) -> dict[str, float | None]:
-        """What JSON can hold: null for what is undefined or infinite."""
-        return {
-            key: value if value is not None and math.isfinite(value) else None for key, value in asdict(self).items()
-        }
+    def json(self) -> dict[str, float | str | None]:
+        """What JSON can hold: null for what is undefined or infinite, `flip_reason` only where there is one."""
+        found = asdict(self)
+        reason = found.pop("flip_reason")
+        numbers = {key: value if value is not None and math.isfinite(value) else None for key, value in found.items()}
+        return {**numbers, **({"flip_reason": reason} if reason else {})}
 
 
 def errors(
@@ -60,13 +67,16 @@ def errors(
     a, b = np.asarray(M, np.float64)[seen], np.asarray(reference, np.float64)[seen]
     difference = a - b
     rms, peak = _rms(b), float(b.max())
+    pictures = None if display is None or reference_display is None else (display, reference_display)
+    with_flip = find_spec("flip_evaluator") is not None
     differ = (np.abs(difference) > _ROUNDING * np.abs(b).max()).any(axis=-1)
     return Errors(
         rel_rmse=_rms(difference) / rms if rms > 0.0 else None,
         psnr=_psnr(difference[differ], peak),
         psnr_all=_psnr(difference if differ.any() else difference[:0], peak),
         bias=float(a.mean() / b.mean()) if b.mean() > 0.0 else None,
-        flip=None if display is None or reference_display is None else _flip(display, reference_display, seen),
+        flip=_flip(*pictures, seen) if pictures and with_flip else None,
+        flip_reason=NO_FLIP if pictures and not with_flip else None,
         floor=0.0 if error is None else _rms(np.asarray(error, np.float64)[seen]) / rms if rms > 0.0 else None,
     )
 

@@ -74,7 +74,7 @@ def versions() -> dict[str, str]:
         try:
             found[package] = version(package)
         except PackageNotFoundError:  # of those that can be done without
-            continue
+            found[package] = "not installed"
     return found
 
 

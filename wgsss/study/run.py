@@ -60,7 +60,8 @@ def measure(scene: Scene, spec: Spec) -> dict[str, Any]:
     to prepare the method, and `bake_cached`, whether the cache had all of it; `frame_ms`, the median of the time
     that the passes of a frame take, by `clock`, its `frame_ms_quartiles` and `frames`, how many; `passes`, ms of each
     in the median frame; `bytes`, textures and buffers of a frame, transient and persistent; `error` {rel_rmse, psnr,
-    flip, bias}, and `floor`, the rel_rmse that the reference's own error accounts for.
+    flip, bias} and `flip_reason` where flip is missing; and `floor`, the rel_rmse that the reference's own error
+    accounts for.
 
     Raises InputError and RenderError as the method and the reference do.
     """
@@ -100,7 +101,7 @@ def _measured(scene: Scene, spec: Spec) -> dict[str, Any]:
         "frames": cost.frames,
         "passes": cost.passes,
         "bytes": cost.bytes,
-        "error": {name: found[name] for name in ("rel_rmse", "psnr", "flip", "bias")},
+        "error": {name: found[name] for name in ("rel_rmse", "psnr", "flip", "bias", "flip_reason") if name in found},
         "floor": found["floor"],
     }
 

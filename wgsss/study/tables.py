@@ -19,7 +19,7 @@ def measures(run: Run) -> dict[str, str]:
         "PSNR": decibels(found.psnr),
         "PSNR all": decibels(found.psnr_all),
         "bias": "-" if found.bias is None else f"{found.bias:.3f}",
-        "FLIP": "-" if found.flip is None else f"{found.flip:.3f}",
+        "FLIP": flip(found.flip, found.flip_reason),
         "frame": milliseconds(run.frame_ms),
         "bake": milliseconds(run.bake_ms),
         "memory": f"{run.bytes / 2**20:.3g} MiB",
@@ -57,6 +57,10 @@ def floor(comparison: Comparison) -> str:
 
 def percent(value: float | None) -> str:
     return "-" if value is None else f"{value * 100:.3g} %"
+
+
+def flip(value: float | None, reason: str | None) -> str:
+    return f"{value:.3f}" if value is not None else "not installed" if reason else "-"
 
 
 def decibels(value: float | None) -> str:
