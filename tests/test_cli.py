@@ -261,7 +261,7 @@ BAD = [
     ("render ear --translucency samm", "unknown translucency 'samm'; did you mean 'sam'?"),
     ("render ear --method sam --surface screen", "name either it or those"),
     ("render ear --set mapsize=512", "unknown knob of deon07 'mapsize'; did you mean 'map_size'?"),
-    ("render ear --set map_size=12", "map_size must lie between 64 and 4096, not 12"),
+    ("render ear --set map_size=12", "map_size must lie between 64 and 4096 (texels), not 12"),
     ("render ear --set map_size=big", "map_size must be a whole number, not 'big'"),
     ("render ear --set map_size", "'map_size' is not KNOB=VALUE"),
     ("render ear --size 0x100", "image size must be 1 to 8192 pixels"),

@@ -1,4 +1,4 @@
-"""Text that comes from users, where it is shown: names of scenes, materials and files may hold anything."""
+"""Text that comes from users, where it is shown: names and values may hold anything."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import unicodedata
 from typing import Any
 
 _HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode's categories of control, format, surrogate and separator
+_LONGEST = 60  # characters of a value in a message
 _JOINERS = "\u200c\u200d"  # between letters of some scripts, and in emoji
 
 
@@ -36,6 +37,21 @@ def figure_text(text: object, most: int = 80) -> str:
     out of legends."""
     line = shortened(text, most).replace("$", r"\$")
     return f" {line}" if line.startswith("_") else line
+
+
+def span(low: float, high: float, above: bool = False, unit: str = "") -> str:
+    """A range in words; `above` leaves out its low end."""
+    ends = f"above {low:g} and at most {high:g}" if above else f"from {low:g} to {high:g}"
+    return f"{ends} ({unit})" if unit else ends
+
+
+def shown(value: Any) -> str:
+    """A value in a message."""
+    try:
+        text = one_line(repr(value))
+    except (ValueError, RecursionError):  # an integer of thousands of digits, a list in itself
+        text = f"that {type(value).__name__}"
+    return shortened(text, _LONGEST)
 
 
 def script_json(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""Numbers that users give: what counts as one, and how a message shows values and ranges."""
+"""Numbers that users give: what counts as one."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-_LONGEST = 60  # characters of a value in a message
 
 
 def is_number(value: Any) -> bool:
@@ -31,18 +29,3 @@ def array_of(values: Any) -> npt.NDArray[np.float64]:
 
 def _is_float(value: Any) -> bool:
     return is_number(value) or isinstance(value, float | np.floating)  # NaN and infinity too: callers name their place
-
-
-def span(low: float, high: float, above: bool = False, unit: str = "") -> str:
-    """A range in words; `above` leaves out its low end."""
-    ends = f"above {low:g} and at most {high:g}" if above else f"from {low:g} to {high:g}"
-    return f"{ends} ({unit})" if unit else ends
-
-
-def shown(value: Any) -> str:
-    """A value in a message."""
-    try:
-        text = " ".join(repr(value).split())
-    except (ValueError, RecursionError):  # an integer of thousands of digits, a list in itself
-        text = f"that {type(value).__name__}"
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

@@ -7,11 +7,12 @@ import math
 import re
 import sys
 import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from wgsss import saying
 from wgsss.errors import InputError
-from wgsss.text import escaped, printable
+from wgsss.text import escaped, printable, span
 
 if TYPE_CHECKING:
     from wgsss.methods import Method
@@ -66,7 +67,7 @@ def add_scene_choices(parser: Parser) -> None:
     """What may be other than a scene has it."""
     add = parser.add_argument
     add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
-    add("--size-mm", metavar="X", type=positive, help="of a mesh file: length of its longest side, mm")
+    add("--size-mm", metavar="X", type=length, help="of a mesh file: length of its longest side, mm")
     add("--animation", metavar="NAME", help="of a glTF: the animation to play, or none (default: its first)")
     add("--simplify", metavar="N", type=count, help="of a mesh file: reduce each part of it to N faces, if it has more")
     add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
@@ -78,8 +79,8 @@ def add_scene_choices(parser: Parser) -> None:
 
 def has_scene_choices(args: argparse.Namespace) -> bool:
     """Whether anything is to be other than a scene has it."""
-    chosen = (args.material, args.size_mm, args.animation, args.simplify, args.vertices, args.camera, args.light)
-    return any((*chosen, args.file_camera, args.file_lights))
+    named = (args.material, args.size_mm, args.animation, args.simplify, args.vertices, args.camera)
+    return any(value is not None for value in named) or bool(args.light or args.file_camera or args.file_lights)
 
 
 def add_method(parser: Parser) -> None:
@@ -96,7 +97,7 @@ def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
     from wgsss.scene import load_scene
 
     return load_scene(
-        name or args.scene,
+        args.scene if name is None else name,
         material=args.material,
         size_mm=args.size_mm,
         animation=args.animation,
@@ -113,12 +114,12 @@ def make_method(args: argparse.Namespace) -> Method:
     """The method that the arguments name, its knobs set."""
     from wgsss.methods import make_method
 
-    name = args.method or DEFAULT_METHOD
-    if args.surface or args.translucency:
-        if args.method:
-            raise InputError(f"--method {args.method} has a surface and a translucency: name either it or those")
-        name = f"{args.surface or 'none'}+{args.translucency or 'none'}"
-    return make_method(name, dict(args.knobs))
+    parts = args.surface, args.translucency
+    if parts == (None, None):
+        return make_method(DEFAULT_METHOD if args.method is None else args.method, dict(args.knobs))
+    if args.method is not None:
+        raise InputError(f"--method {args.method} has a surface and a translucency: name either it or those")
+    return make_method("+".join("none" if part is None else part for part in parts), dict(args.knobs))
 
 
 def tell(args: argparse.Namespace, result: dict[str, Any], text: str) -> None:
@@ -154,30 +155,41 @@ def count(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """A finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number")
-    return value
+    """A number."""
+    return _within(text, -1e300, 1e300)
 
 
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    value = number(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
-    return value
+def length(text: str) -> float:
+    """Millimetres."""
+    return _within(text, 1e-6, 1e13, "mm")
+
+
+def seconds(text: str) -> float:
+    """A time."""
+    return _within(text, -1e9, 1e9, "seconds")
 
 
 def rate(text: str) -> float:
     """Frames per second."""
-    value = number(text)
-    if not 0.01 <= value <= 1000:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0.01 to 1000")
+    return _within(text, 0.01, 1000)
+
+
+def _within(text: str, low: float, high: float, unit: str = "") -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        wanted = "a number" if (low, high) == (-1e300, 1e300) else f"a number {span(low, high, unit=unit)}"
+        raise argparse.ArgumentTypeError(f"'{text}' is not {wanted}")
     return value
+
+
+def output(text: str) -> Path:
+    """The path of a file or folder to write."""
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is not the name of a file or folder")
+    return Path(text)
 
 
 def assignment(text: str) -> tuple[str, str]:
@@ -192,7 +204,7 @@ def table_of(text: str) -> dict[str, Any]:
     """A table of TOML in one line."""
     try:
         found = tomllib.loads(f"table = {text}")["table"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # of the grammar, a number too long, nested too deep
         found = None
     if not isinstance(found, dict):
         raise argparse.ArgumentTypeError(f"'{text}' is not a table such as {{kind = \"orthographic\", height = 200}}")

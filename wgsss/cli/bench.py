@@ -41,7 +41,7 @@ def declare(commands: Any) -> None:
     add("--table", metavar="NAME", choices=TABLES, help=_TABLE)
     add("--size", metavar="WxH", type=arguments.size, help=_SIZE)
     add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)
-    add("-o", "--output", metavar="DIR", type=Path, default=Path("bench"), help=_FOLDER)
+    add("-o", "--output", metavar="DIR", type=arguments.output, default=Path("bench"), help=_FOLDER)
 
 
 def run(args: Any) -> None:
@@ -76,7 +76,7 @@ def _speedup(args: Any) -> None:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
     if arguments.has_scene_choices(args):
         raise InputError("the table speedup is of the scene crowd as it is: no --material and the like")
-    if args.methods or args.scheduler:
+    if args.methods is not None or args.scheduler is not None:
         raise InputError("the table speedup is of two methods, measured here: no --methods and no --scheduler")
     table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)
     about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"

@@ -23,7 +23,7 @@ def declare(commands: Any) -> None:
     add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
     add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
     add("--lights", choices=["all"], help="'all': also under one light of each type, of the same mean irradiance")
-    add("-o", "--output", metavar="DIR", type=Path, help=_OUTPUT)
+    add("-o", "--output", metavar="DIR", type=arguments.output, help=_OUTPUT)
 
 
 def run(args: Any) -> None:

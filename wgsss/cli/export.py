@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from wgsss.cli import arguments
@@ -13,10 +12,10 @@ def declare(commands: Any) -> None:
     parser = arguments.command(commands, "export", run, "write a scene for Mitsuba 3 or as glTF")
     arguments.add_scene(parser)
     add = parser.add_argument
-    add("--mitsuba", metavar="DIR", type=Path, help="the folder to write scene.xml and its files to")
-    add("--gltf", metavar="FILE.glb", type=Path, help="the glTF file to write")
+    add("--mitsuba", metavar="DIR", type=arguments.output, help="the folder to write scene.xml and its files to")
+    add("--gltf", metavar="FILE.glb", type=arguments.output, help="the glTF file to write")
     add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
-    add("--time", metavar="S", type=arguments.number, default=0.0, help="of a moving scene, seconds (default: 0)")
+    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="of a moving scene, seconds (default: 0)")
 
 
 def run(args: Any) -> None:

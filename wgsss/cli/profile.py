@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss import saying
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MATERIAL = "a measured material (see 'wgsss materials') or a material file (.toml), which may have layers"
+_PLOT = "plot R and r R, log and linear, to a .png or .svg"
 _MODEL = (
     "dipole, better-dipole, multipole, layers, burley, burley-diffuse, burley-dmfp, borshukov-lewis, gaussians, table \
 or photons; may be given several times (default: those that serve the material)"
@@ -26,10 +26,16 @@ def declare(commands: Any) -> None:
     add("material", metavar="MATERIAL", help=_MATERIAL)
     add("--model", metavar="M", dest="models", action="append", default=[], help=_MODEL)
     add("--k", metavar="K", type=gaussians, default=6, help="Gaussians of a fit, 1 to 6 (default: 6)")
-    add("--thickness", metavar="MM", type=arguments.positive, help="of a slab in air (default: without end)")
+    add("--thickness", metavar="MM", type=arguments.length, help="of a slab in air (default: without end)")
     add("--r", metavar="MM,MM,…", type=radii, help="distances to print R at (default: 64 that show all of it)")
     add("--photons", metavar="N", type=arguments.count, help="trace N photons per channel, as one of the models")
-    add("-o", "--output", metavar="FILE", type=Path, help="plot R and r R, log and linear, to a .png or .svg")
+    add(
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=arguments.output,
+        help="plot R and r R, log and linear, to a .png or .svg",
+    )
     add("--csv", action="store_true", help="print R, one row per distance")
 
 
@@ -74,8 +80,8 @@ def gaussians(text: str) -> int:
 def radii(text: str) -> list[float]:
     """Distances in mm, with commas between them."""
     values = [arguments.number(part) for part in text.split(",")]
-    if min(values) < 0:
-        raise argparse.ArgumentTypeError(f"'{text}' has a distance below 0")
+    if not 0 <= min(values) <= max(values) <= 1e12:
+        raise argparse.ArgumentTypeError(f"'{text}' has a distance that is not from 0 to 1e12 (mm)")
     return values
 
 

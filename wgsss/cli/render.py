@@ -29,13 +29,13 @@ def declare(commands: Any) -> None:
     add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
     add("--frames", metavar="N", type=arguments.count, default=1, help="render N frames (default: 1)")
     add("--fps", metavar="F", type=arguments.rate, default=25.0, help="frames per second (default: 25)")
-    add("--time", metavar="S", type=arguments.number, default=0.0, help="of the first frame, seconds (default: 0)")
+    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="of the first frame, seconds (default: 0)")
     add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
     add("--tone-map", metavar="NAME", help="none, reinhard or aces, instead of the scene's own")
     add("--bloom", metavar="SHARE", type=arguments.number, help="of the light that spreads, in pictures")
-    add("-o", "--output", metavar="FILE", type=Path, help=_OUTPUT)
+    add("-o", "--output", metavar="FILE", type=arguments.output, help=_OUTPUT)
     add("--graph", action="store_true", help=_GRAPH)
-    add("--graph-out", metavar="FILE.dot", type=Path, help="write that frame's graph for Graphviz")
+    add("--graph-out", metavar="FILE.dot", type=arguments.output, help="write that frame's graph for Graphviz")
 
 
 def run(args: Any) -> None:

@@ -20,6 +20,7 @@ from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps
 from wgsss.methods.transmittance import Transmittance
+from wgsss.text import shown
 
 TRANSLUCENCIES: dict[str, type[Translucency]] = {
     "tsm": TranslucentShadowMaps,
@@ -104,18 +105,20 @@ def _parsed(where: str, knob: Any, value: Any) -> Any:
     choices = knob.metadata.get("choices")
     if choices is not None:
         if value not in choices:
-            raise InputError(f"{where} must be one of {', '.join(choices)}, not '{value}'")
+            raise InputError(f"{where} must be one of {', '.join(choices)}, not {shown(value)}")
         return value
     kind = type(knob.default)
     if kind is bool:
         return _switched(where, value)
     try:
         parsed = kind(float(value)) if kind is int and float(value).is_integer() else kind(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{where} must be {'a whole number' if kind is int else 'a number'}, not '{value}'") from None
+    except (TypeError, ValueError, OverflowError):
+        wanted = "a whole number" if kind is int else "a number"
+        raise InputError(f"{where} must be {wanted}, not {shown(value)}") from None
     low, high = knob.metadata["range"]
     if not low <= parsed <= high:
-        raise InputError(f"{where} must lie between {low:g} and {high:g}, not {parsed:g}")
+        unit = f" ({knob.metadata['unit']})" if knob.metadata["unit"] else ""
+        raise InputError(f"{where} must lie between {low:g} and {high:g}{unit}, not {shown(parsed)}")
     return parsed
 
 
@@ -126,7 +129,7 @@ def _switched(where: str, value: Any) -> bool:
     """Whether a switch is on."""
     found = _SWITCHES.get(str(value).lower())
     if found is None:
-        raise InputError(f"{where} must be on or off, not '{value}'")
+        raise InputError(f"{where} must be on or off, not {shown(value)}")
     return found
 
 

@@ -12,7 +12,7 @@ from wgsss.errors import InputError
 from wgsss.optics import fresnel, sources
 from wgsss.optics.medium import CHANNELS, DENSEST, LONGEST, SHORTEST, THINNEST, Medium, coefficients
 from wgsss.optics.profile import Profile, distances, shares
-from wgsss.values import span
+from wgsss.text import span
 
 Array = NDArray[np.float64]
 Term = Callable[..., Array]

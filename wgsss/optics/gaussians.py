@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from wgsss.errors import InputError
 from wgsss.optics.medium import MOST_TOTAL
 from wgsss.optics.profile import Profile, distances, shares
-from wgsss.values import array_of, shown, span
+from wgsss.text import shown, span
+from wgsss.values import array_of
 
 Array = NDArray[np.float64]
 

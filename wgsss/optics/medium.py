@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss.errors import InputError
-from wgsss.values import array_of, is_number, shown, span
+from wgsss.text import shown, span
+from wgsss.values import array_of, is_number
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,8 @@ class Layer(Medium):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        for name in ("sigma_a", "sigma_s_prime"):
+            coefficients(name, getattr(self, name), 0.0, DENSEST, "1/mm")
         if self.thickness != math.inf and not (is_number(self.thickness) and 0.0 < self.thickness <= LONGEST):
             raise InputError(f"thickness must be {span(0.0, LONGEST, True, 'mm')}, or inf, not {shown(self.thickness)}")
         if not (is_number(self.g) and -1.0 < self.g < 1.0):

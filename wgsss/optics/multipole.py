@@ -15,7 +15,8 @@ from wgsss.optics import sources
 from wgsss.optics.medium import LONGEST, Medium, check_index
 from wgsss.optics.profile import Profile, distances, shares
 from wgsss.optics.slab import Spectrum, check_alone, check_thickness, extrapolation, slab_spectra
-from wgsss.values import is_number, shown
+from wgsss.text import shown
+from wgsss.values import is_number
 
 Array = NDArray[np.float64]
 

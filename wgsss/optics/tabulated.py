@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from wgsss.errors import InputError
 from wgsss.optics.medium import CHANNELS, LONGEST, MOST_TOTAL
 from wgsss.optics.profile import Profile, distances, shares
+from wgsss.text import shown, span
 from wgsss.userfiles import read_text
-from wgsss.values import array_of, shown, span
+from wgsss.values import array_of
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from collections.abc import Iterable
 
 from wgsss.errors import InputError
 from wgsss.scene.images.files import MAX_SIDE
-from wgsss.values import is_number, shown, span
+from wgsss.text import shown, span
+from wgsss.values import is_number
 
 Triple = tuple[float, float, float]
 

@@ -13,8 +13,8 @@ from wgsss.optics import Dipole, Layer, SumOfGaussians, Tabulated
 from wgsss.scene import tables
 from wgsss.scene.images import read_map
 from wgsss.scene.material import IN_PLACE, MATERIALS, SLOTS, Maps, Material, material
+from wgsss.text import shown
 from wgsss.userfiles import path_from
-from wgsss.values import shown
 
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 _INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")

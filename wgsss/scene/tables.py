@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.errors import InputError, unknown
+from wgsss.text import shown
 from wgsss.userfiles import path_from, read_text, require_file
-from wgsss.values import shown
 
 Table = dict[str, Any]
 Parameters = Mapping[str, inspect.Parameter]

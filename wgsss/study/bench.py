@@ -59,7 +59,10 @@ def bench(
         RenderError: where a number is not finite. The runs before it are kept.
     """
     specs = [(scene, spec) for scene in scenes for spec in _specs(scene, methods, size, reference)]
-    with _cluster(scheduler) if scheduler else _here() as (adapters, runs), appended(Path(folder)) as (before, append):
+    with (
+        _here() if scheduler is None else _cluster(scheduler) as (adapters, runs),
+        appended(Path(folder)) as (before, append),
+    ):
         done = {_key(run): run for run in before if run["adapter"] in adapters}
         todo = [(scene, spec) for scene, spec in specs if _key(spec.json()) not in done]
         bar = progress(total=len(specs), initial=len(specs) - len(todo), unit="run")
