@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shlex
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +21,9 @@ import pytest
 from conftest import ROOT
 from PIL import Image as Picture
 
-from wgsss.cli import main
+from wgsss.cli import catalogue, main
+from wgsss.errors import Note
+from wgsss.graph import Graph
 from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
 from wgsss.reference import REFERENCES
 from wgsss.rendering import AOVS, DEFAULT_METHOD
@@ -106,7 +110,8 @@ def test_info_names_the_adapter_and_the_versions(wgsss: Run) -> None:
 def test_help_needs_nothing_heavy_and_names_every_command_and_the_default_method() -> None:
     script = f"""
 import sys
-from wgsss.cli import main
+from wgsss.cli import catalogue, main
+from wgsss.errors import Note
 for argv in (["--help"], ["render", "--help"]):
     try:
         main(argv)
@@ -310,20 +315,71 @@ def test_no_adapter_is_one_line(tmp_path: Path, command: str) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_picture_that_is_not_finite_is_a_failure_and_no_file(wgsss: Run, tmp_path: Path) -> None:
-    light = 'kind = "directional"\ndirection = [0, 0, -1]\nirradiance = [3e38, 3e38, 3e38]\n'
-    (tmp_path / "sun.toml").write_text(SCENE + "[[light]]\n".join([light] * 9))
-    result = wgsss("render", "sun.toml", "--method", "lambert", "--size", "16x16", "-o", "a.exr")
+def test_a_picture_that_is_not_finite_is_a_failure_and_no_file(
+    wgsss: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = Graph.read
+    monkeypatch.setattr(Graph, "read", lambda graph, handle: read(graph, handle) + np.array([np.nan, 0, 0, 0]))
+    result = wgsss("render", *SMALL, "-o", "a.exr")
     assert result.err.startswith("wgsss: error: ") and "not finite" in result.err and result.err.count("\n") == 1
     assert (result.code, result.out) == (1, "")
-    assert [path.name for path in tmp_path.iterdir()] == ["sun.toml"]
+    assert not list(tmp_path.iterdir())
 
 
-def test_warnings_are_one_line_each(wgsss: Run, tmp_path: Path) -> None:
+def test_warnings_are_one_line_each_and_in_the_json(wgsss: Run, tmp_path: Path) -> None:
     (tmp_path / "open.ply").write_bytes(ply(TRIANGLE))
-    result = wgsss("render", "open.ply", "--method", "lambert", "--size", "8x8")
-    assert result.err.startswith("wgsss: warning: open.ply: ") and result.err.count("\n") == 1
-    assert result.code == 0
+    command = ["render", "open.ply", "--method", "lambert", "--size", "8x8"]
+    result = wgsss(*command)
+    lines = result.err.splitlines()
+    assert lines[0].startswith("wgsss: warning: open.ply: 3 boundary edges") and result.code == 0
+    assert all(line.startswith("wgsss: warning: ") for line in lines) and len(set(lines)) == len(lines)
+    told = json.loads(wgsss(*command, "--json").out)["warnings"]
+    assert [f"wgsss: warning: {text}" for text in told] == lines
+    assert json.loads(wgsss("render", *SMALL, "--json").out)["warnings"] == []
+
+
+def test_warnings_of_libraries_are_not_the_users(
+    wgsss: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def scenes(args: object) -> None:
+        warnings.warn("a library's own", DeprecationWarning, stacklevel=1)
+        np.float64(1.0) / np.float64(0.0)
+        logging.getLogger("library").warning("logged")
+        for _ in range(2):
+            warnings.warn("the\n   user's", Note, stacklevel=1)
+
+    monkeypatch.setattr(catalogue, "scenes", scenes)
+    assert wgsss("scenes") == Said(0, "", "wgsss: warning: the user's\n")
+
+
+# what nobody expects
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            IndexError("list index\nout of range"),
+            "a fault of wgsss, not of the input (IndexError: list index out of range)",
+        ),
+        (RecursionError("too deep"), "a fault of wgsss, not of the input (RecursionError: too deep)"),
+        (AssertionError(), "a fault of wgsss, not of the input (AssertionError: )"),
+        (MemoryError("Unable to allocate 9 TiB"), "there is not enough memory for this (Unable to allocate 9 TiB)"),
+    ],
+)
+def test_a_fault_of_the_program_is_one_line_and_all_of_it_on_request(
+    wgsss: Run, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+) -> None:
+    def scenes(args: object) -> None:
+        raise error
+
+    monkeypatch.setattr(catalogue, "scenes", scenes)
+    result = wgsss("scenes")
+    assert result.err.startswith(f"wgsss: error: {said}") and result.err.count("\n") == 1
+    assert (result.code, result.out) == (1, "")
+    monkeypatch.setenv("WGSSS_DEBUG", "1")
+    lines = wgsss("scenes").err.splitlines()
+    assert lines[0].startswith("Traceback") and "in scenes" in "".join(lines) and lines[-1] == result.err.rstrip()
 
 
 def test_an_interrupt_is_quiet_and_leaves_only_whole_frames(tmp_path: Path) -> None:

@@ -147,11 +147,16 @@ def size(text: str) -> tuple[int, int]:
     return found
 
 
-def count(text: str) -> int:
-    """A whole number from 1 to 999999999."""
-    if not re.fullmatch(r"[0-9]{1,9}", text) or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to 999999999")
+def count(text: str, most: int = 999_999_999) -> int:
+    """A whole number from 1 to `most`."""
+    if not re.fullmatch(r"[0-9]{1,9}", text) or not 1 <= int(text) <= most:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to {most}")
     return int(text)
+
+
+def frames(text: str) -> int:
+    """How many frames: an hour has 100,000 or so."""
+    return count(text, 100_000)
 
 
 def number(text: str) -> float:

@@ -66,7 +66,9 @@ def run(args: Any) -> None:
             raise InputError("without a scene there is nothing to measure: no --material and the like")
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
-    arguments.tell(args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *files]))
+    arguments.tell(
+        args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *map(one_line, files)])
+    )
 
 
 def _speedup(args: Any) -> None:
@@ -82,7 +84,7 @@ def _speedup(args: Any) -> None:
     about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"
     lines = [arguments.table(table.rows()), "", f"{about}, maps of {table.map_size}, {table.adapter}"]
     file = str(args.output / FILE)
-    arguments.tell(args, {**table.json(), "files": [file]}, "\n".join([*lines, "", file]))
+    arguments.tell(args, {**table.json(), "files": [file]}, "\n".join([*lines, "", one_line(file)]))
 
 
 TABLES = {"speedup": _speedup}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.cli import arguments
+from wgsss.text import one_line
 
 _OUTPUT = """the folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); what
 else is in it stays"""
@@ -55,4 +56,4 @@ def run(args: Any) -> None:
         parts.append(f"by cause: alone (and what it adds)\n{tables.aligned(tables.by_cause(found))}")
     if found.lights:
         parts.append(f"by type of light: rel RMSE\n{tables.aligned(tables.by_light(found))}")
-    arguments.tell(args, result, "\n\n".join([*parts, str(folder / "report.html")]))
+    arguments.tell(args, result, "\n\n".join([*parts, one_line(folder / "report.html")]))

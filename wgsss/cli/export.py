@@ -6,6 +6,7 @@ from typing import Any
 
 from wgsss.cli import arguments
 from wgsss.errors import InputError
+from wgsss.text import one_line
 
 
 def declare(commands: Any) -> None:
@@ -32,9 +33,10 @@ def run(args: Any) -> None:
     if args.mitsuba is not None:
         files = mitsuba_scene.export(scene, args.mitsuba, args.size)
         written += files
-        lines.append(f"{files[0]}: {scene.name}, {len(files)} files; render it with 'mitsuba {files[0]}'")
+        what = f"{files[0]}: {scene.name}, {len(files)} files; render it with 'mitsuba {files[0]}'"
+        lines.append(one_line(what))
     if args.gltf is not None:
         written.append(output_gltf.export(scene, args.gltf, args.size[0] / args.size[1]))
-        lines.append(f"{args.gltf}: {scene.name}, glTF")
+        lines.append(one_line(f"{args.gltf}: {scene.name}, glTF"))
     result = {"files": [str(file) for file in written], "scene": scene.name, "size": args.size, "time": args.time}
     arguments.tell(args, result, "\n".join(lines))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from wgsss import saying
 from wgsss.cli import arguments
+from wgsss.text import one_line
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,15 +67,14 @@ def run(args: Any) -> None:
         saying.result(_csv(rows, r))
     else:
         text = "\n".join([*_about(case), "", _totals(rows, args.k), *(["", _values(rows, r)] if args.r else [])])
-        arguments.tell(args, {"material": material.name, "models": rows}, text + (f"\n\n{output}" if output else ""))
+        arguments.tell(
+            args, {"material": material.name, "models": rows}, text + (f"\n\n{one_line(output)}" if output else "")
+        )
 
 
 def gaussians(text: str) -> int:
     """1 to 6."""
-    value = arguments.count(text)
-    if value > 6:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to 6")
-    return value
+    return arguments.count(text, 6)
 
 
 def radii(text: str) -> list[float]:
@@ -86,7 +86,7 @@ def radii(text: str) -> list[float]:
 
 
 def _title(case: Any) -> str:
-    return case.material.name + (f", {case.thickness:g} mm" if case.thickness else "")
+    return one_line(case.material.name) + (f", {case.thickness:g} mm" if case.thickness else "")
 
 
 def _about(case: Any) -> list[str]:
@@ -95,7 +95,7 @@ def _about(case: Any) -> list[str]:
     for number, layer in enumerate(case.stack if case.material.stack else [], start=1):
         depth = "without end" if layer.thickness == float("inf") else f"{layer.thickness:g} mm thick"
         lines.append(
-            f"{case.material.name}{f', layer {number}' if len(case.stack) > 1 else ''}: eta {layer.eta:g}, {depth}"
+            f"{one_line(case.material.name)}{f', layer {number}' if len(case.stack) > 1 else ''}: eta {layer.eta:g}, {depth}"
         )
         quantities = {
             "sigma_a": (layer.sigma_a, "1/mm"),
@@ -105,7 +105,7 @@ def _about(case: Any) -> list[str]:
             "diffuse mean free path": (layer.diffuse_mean_free_path, "mm"),
         }
         lines += [f"  {name:23}{_numbers(values, 8)} {unit}".rstrip() for name, (values, unit) in quantities.items()]
-    return lines or [f"{case.material.name}: known by its profile"]
+    return lines or [f"{one_line(case.material.name)}: known by its profile"]
 
 
 def _totals(rows: list[dict[str, Any]], k: int) -> str:

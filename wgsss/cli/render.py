@@ -27,7 +27,7 @@ def declare(commands: Any) -> None:
     arguments.add_method(parser)
     add = parser.add_argument
     add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
-    add("--frames", metavar="N", type=arguments.count, default=1, help="render N frames (default: 1)")
+    add("--frames", metavar="N", type=arguments.frames, default=1, help="render N frames (default: 1)")
     add("--fps", metavar="F", type=arguments.rate, default=25.0, help="frames per second (default: 25)")
     add("--time", metavar="S", type=arguments.seconds, default=0.0, help="of the first frame, seconds (default: 0)")
     add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
@@ -71,7 +71,8 @@ def run(args: Any) -> None:
         "seconds": {"prepare": round(ready - start, 3), "frames": round(done - ready, 3)},
     }
     files = str(written[0]) if len(written) == 1 else f"{written[0]} … {written[-1].name}"
-    lines = [f"{files}: {scene.name} by {name}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
+    what = one_line(f"{files}: {scene.name} by {name}")
+    lines = [f"{what}, {args.size[0]} x {args.size[1]}, {done - start:.2f} s"]
     if args.graph or dot:
         graph = renderer.frame(_time(args, args.frames - 1), timed=True).graph
         if dot:

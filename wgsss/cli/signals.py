@@ -42,7 +42,7 @@ def stoppable() -> Iterator[None]:
         nonlocal stopped
         if isinstance(lost.exc_value, Stopped):  # it came where Python drops exceptions, as when an object is freed
             stopped = False
-            threading.Timer(_AGAIN_S, _thread.interrupt_main, (lost.exc_value.code - 128,)).start()
+            threading.Timer(_AGAIN_S, _send, (lost.exc_value.code - 128,)).start()
         else:
             before_hook(lost)
 
@@ -60,3 +60,11 @@ def stoppable() -> Iterator[None]:
         if not stopped:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _send(number: int) -> None:
+    """Send a signal to the main thread, which only a signal wakes from what it waits for."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        _thread.interrupt_main(number)

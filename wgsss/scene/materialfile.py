@@ -123,4 +123,4 @@ def _inverted(table: tables.Table, eta: Any, where: str) -> tables.Table:
         medium = Dipole.from_reflectance(table["reflectance"], eta=eta, **lengths)
     except InputError as error:
         raise tables.at(where, error) from None
-    return {"sigma_a": medium.sigma_a, "sigma_s_prime": medium.sigma_s_prime}
+    return {name: tuple(getattr(medium, name).tolist()) for name in _COEFFICIENTS}

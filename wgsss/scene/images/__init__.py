@@ -6,5 +6,6 @@ from wgsss.scene.images.files import MAX_SIDE
 from wgsss.scene.images.maps import read_map
 from wgsss.scene.images.pixels import read_pixels
 from wgsss.scene.images.radiance import read_radiance, read_sky
+from wgsss.userfiles import require_file
 
-__all__ = ["MAX_SIDE", "read_map", "read_pixels", "read_radiance", "read_sky"]
+__all__ = ["MAX_SIDE", "read_map", "read_pixels", "read_radiance", "read_sky", "require_file"]
