@@ -118,7 +118,7 @@ def _view(scene: Scene, size: tuple[int, int]) -> View:
     orthographic = isinstance(camera, OrthographicCamera)
     if not orthographic:  # inside or in front of the scene
         far = max(far, 1e-3)
-        near = max(near, 1e-3 * far)
+        near = max(near, 1e-4 * far)
     world_to_clip = camera.projection(size[0] / size[1], near, far) @ to_view
     towards = np.subtract(camera.eye, camera.target)
     eye = (*(towards / np.linalg.norm(towards)), 0.0) if orthographic else (*camera.eye, 1.0)

@@ -19,9 +19,10 @@ from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
 from wgsss.scene.dressing import Wardrobe, shared, wearable
 from wgsss.scene.files import read_file
-from wgsss.scene.files.contents import CameraView, Contents, LightSource, Look
+from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
-from wgsss.scene.mesh import MAX_SIZE, MIN_SIZE, Mesh
+from wgsss.scene.mesh import Mesh
+from wgsss.scene.places import boxes, centred, clusters, scale
 from wgsss.scene.repair import Repaired, counted, repair
 from wgsss.scene.rig import Rig
 from wgsss.scene.simplify import simplified
@@ -32,9 +33,6 @@ Array = npt.NDArray[Any]
 # A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
 # or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
 OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
-FAR = 16.0
-"""Distance from the origin, in sizes of a body, beyond which its positions are kept relative to its own middle: float32
-would lose four bits or more of them."""
 MOST_VERTICES = 2_796_202
 """What a storage binding of 128 MiB, WebGPU's default limit, holds of the 48 bytes of a vertex."""
 
@@ -77,7 +75,7 @@ def load_mesh(
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
     looks = [wearable(part, file.say) for part in file.contents.parts]
-    return file.bodies({shared(looks, file.say): list(range(len(looks)))})[0]
+    return file.bodies([(shared(looks, file.say), list(range(len(looks))))])[0]
 
 
 def load_file(
@@ -105,13 +103,12 @@ def load_file(
     not fit it, and for a scale that is not positive.
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
-    groups: dict[Look, list[int]] = {}
-    first_of: dict[Look, Look] = {}  # whatever they are called
-    for number, part in enumerate(file.contents.parts):
-        look = wearable(part, file.say)
-        groups.setdefault(first_of.setdefault(replace(look, name=""), look), []).append(number)
-    bodies = file.bodies(groups)
-    return LoadedFile(bodies, file.contents.lights, file.contents.cameras)
+    looks = [wearable(part, file.say) for part in file.contents.parts]
+    alike: dict[Look, list[int]] = {}
+    for number, look in enumerate(looks):
+        alike.setdefault(replace(look, name=""), []).append(number)
+    groups = [(looks[numbers[0]], near) for numbers in alike.values() for near in file.near_each_other(numbers)]
+    return LoadedFile(file.bodies(groups), file.contents.lights, file.contents.cameras)
 
 
 class _File:
@@ -140,7 +137,8 @@ class _File:
         bad = sum(int((~np.isfinite(positions)).any(axis=1).sum()) for positions in self._placed)
         if bad:
             raise InputError(f"{path}: {bad} of {sum(map(len, self._placed))} positions are not finite numbers")
-        self.scale = _scale(path, self.contents, self._placed, mm_per_unit, size_mm)
+        self._boxes = boxes(self.contents.parts, self._placed)
+        self.scale = scale(path, self._boxes, mm_per_unit or self.contents.mm_per_unit, size_mm)
         self._wardrobe = Wardrobe(self.say)
         for note in self.contents.notes:
             self.say(note)
@@ -148,10 +146,15 @@ class _File:
     def say(self, note: str) -> None:
         warnings.warn(f"{self.path.name}: {note}", Note, stacklevel=2)
 
-    def bodies(self, groups: dict[Look, list[int]]) -> tuple[LoadedMesh, ...]:
-        """A body for each look, of parts by number."""
+    def near_each_other(self, numbers: list[int]) -> list[list[int]]:
+        """Parts by number, in groups that can each be one body: what is very far apart cannot."""
+        label = clusters(self._boxes[numbers])
+        return [np.asarray(numbers)[label == one].tolist() for one in np.unique(label)]
+
+    def bodies(self, groups: Sequence[tuple[Look, list[int]]]) -> tuple[LoadedMesh, ...]:
+        """A body for each look and the numbers of the parts that wear it."""
         found, why = [], "all faces are degenerate"
-        for look, numbers in groups.items():
+        for look, numbers in groups:
             name = look.name if len(groups) > 1 else ""
             soup, rig = self._soup(look, numbers)
             mask = self._wardrobe.mask(look)
@@ -188,7 +191,7 @@ class _File:
 
     def _body(self, look: Look, name: str, soup: Soup, rig: Rig | None, splits: bool) -> LoadedMesh | None:
         """A soup as a mesh with all that it wears; None where no face has an area."""
-        centre, positions = _centred(soup.positions * self.scale, soup.faces)
+        centre, positions = centred(soup.positions * self.scale, soup.faces)
         faces, notes = soup.faces, []
         moving = self._clip is not None
         if self.simplify is not None and len(faces) > self.simplify:
@@ -248,33 +251,6 @@ def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
     unit = np.where(np.isfinite(length) & (length > 1e-6), normals / np.maximum(length, 1e-6), smooth)
     far = np.einsum("ijk,ijk->ij", unit, smooth) < math.cos(math.radians(OWN_NORMALS_DEGREES))
     return unit if far.mean() > OWN_NORMALS_SHARE else None
-
-
-def _scale(
-    path: Path, file: Contents, positions: Sequence[Array], mm_per_unit: float | None, size_mm: float | None
-) -> float:
-    """Millimetres per unit."""
-    used = [at[np.unique(part.faces)] for part, at in zip(file.parts, positions, strict=True)]
-    low, high = np.min([u.min(axis=0) for u in used], axis=0), np.max([u.max(axis=0) for u in used], axis=0)
-    with np.errstate(over="ignore"):
-        side = float((high - low).max())
-        if side == 0:
-            raise InputError(f"{path}: the mesh has zero size")
-        scale = float(size_mm / side if size_mm is not None else mm_per_unit or file.mm_per_unit)
-    if not MIN_SIZE <= side * scale <= MAX_SIZE:
-        raise InputError(f"{path}: a size of {side * scale:g} mm is out of range ({MIN_SIZE:g} to {MAX_SIZE:g})")
-    return scale
-
-
-def _centred(positions: Array, faces: Array) -> tuple[Array, Array]:
-    """A point (3,), mm, and the positions as float32 relative to it: the origin, or the middle of what is far off."""
-    used = positions[np.unique(faces)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    middle = (low + high) / 2
-    far = np.abs(middle).max() > FAR * max(float((high - low).max()), MIN_SIZE)
-    centre = middle if far else np.zeros(3)
-    with np.errstate(over="ignore"):
-        return centre, (positions - centre).astype(np.float32)
 
 
 def _named(name: str) -> str:
