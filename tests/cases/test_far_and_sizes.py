@@ -179,8 +179,19 @@ def test_vertices_that_are_split_count(tmp_path: Path, monkeypatch: pytest.Monke
     path = file.save(tmp_path / "ball.glb")
     assert load_scene(path).objects[0].mesh.corner_normals is not None
     monkeypatch.setattr(bodies, "MOST_VERTICES", 2 * len(faces))
-    with pytest.raises(InputError, match=r"--simplify \d+"):
+    with pytest.raises(InputError, match=r"--simplify \d+") as raised:
         load_scene(path)
+    advised = int(re.search(r"--simplify (\d+)", str(raised.value))[1])
+    assert len(told(path, simplify=advised)[0].objects[0].mesh.faces) <= advised < len(faces)
+
+
+def test_duplicate_vertices_do_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Triangles that share no vertices, as in STL files, are welded first."""
+    points, _, faces = ball()
+    file = File()
+    file.node(mesh=file.mesh(file.primitive(points[faces].reshape(-1, 3), None)))
+    monkeypatch.setattr(bodies, "MOST_VERTICES", len(faces))
+    assert len(told(file, tmp_path)[0].objects[0].mesh.faces) == len(faces)
 
 
 @pytest.mark.parametrize("faces", [100, 200])

@@ -9,9 +9,9 @@ from wgsss.cli import arguments
 from wgsss.errors import InputError
 
 _PACKAGES = (
-    *("wgpu", "numpy", "scipy", "scikit-image", "trimesh", "mapbox-earcut", "fast-simplification", "OpenEXR", "imageio"),
-    *("pillow", "matplotlib", "embreex", "libigl", "xatlas", "uvunwrap", "flip-evaluator", "mitsuba", "imgui-bundle"),
-    *("DracoPy", "meshopt"),
+    *("wgpu", "numpy", "scipy", "scikit-image", "trimesh", "mapbox-earcut", "fast-simplification", "OpenEXR"),
+    *("imageio", "pillow", "matplotlib", "embreex", "libigl", "xatlas", "uvunwrap", "flip-evaluator", "mitsuba"),
+    *("imgui-bundle", "DracoPy", "meshopt"),
 )
 _FILE = "a mesh, a scene file (.toml) or an environment image (.hdr .exr)"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,14 +11,16 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, unknown
 from wgsss.scene.blend import Blend
-from wgsss.scene.files.contents import Contents
+from wgsss.scene.files.contents import NONE, Contents
 from wgsss.scene.keyframes import Channel
-from wgsss.scene.repair import weld
+from wgsss.scene.repair import counted, weld
 from wgsss.scene.rig import Rig
 
 Array = npt.NDArray[Any]
 
-NONE = "none"  # in place of an animation's name
+_MOST_NAMES = 8  # of animations in a message
+_NOTHING = 1e-6  # share of its modelled size up to which a part is scaled to nothing
+_MOST_KEYS = 64  # at which a part is looked for that is hidden at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,26 +74,54 @@ class Animation:
             return (moved * self.mm_per_unit - self.centre).astype(np.float32)
 
 
-def choose_clip(contents: Contents, name: str | None) -> Clip | None:
+def choose_clip(contents: Contents, name: str | None, say: Callable[[str], None]) -> Clip | None:
     """One of a file's animations, with those of its channels that move vertices; None where nothing moves.
 
-    `name` is the animation's, or its number from 0 where it has none; None stands for the first one, NONE for none.
+    `name` is the animation's, or its number from 0; None stands for the first one, and NONE for none. What does not
+    play, though nobody chose, is said, and how many channels move nothing.
     Raises InputError where there is no such animation.
     """
-    if name is None:
-        name = next(iter(contents.animations), NONE)
+    names = list(contents.animations)
+    if name is None and len(names) > 1:
+        others = ", ".join(names[1:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
+        say(f"plays {names[0]}, the first of {len(names)} animations (--animation NAME plays another: {others})")
+    name = name if name is not None else next(iter(names), NONE)
     if name == NONE:
         return None
-    if name not in contents.animations:
-        if not contents.animations:
-            raise InputError(f"it has no animations, so none named '{name}'")
-        raise unknown("animation", name, [*contents.animations, NONE])
+    if name not in names and name.isdecimal() and int(name) < len(names):
+        name = names[int(name)]
+    if not names:
+        raise InputError(f"it has no animations, so none named '{name}'")
+    if name not in names:
+        raise unknown("animation", name, [*names, NONE])
     channels = contents.animations[name]()
     if contents.rig is None:
         return None
     movers, morphed = contents.rig.movers(), {part.node for part in contents.rig.parts}
     used = tuple(c for c in channels if c.node in (morphed if c.path == "weights" else movers))
+    idle = len(channels) - len(used)
+    if idle:
+        say(f"animation {name}: {counted(idle, 'channel')} {'moves' if idle == 1 else 'move'} nothing that is drawn")
     return Clip(name, contents.rig, used) if used else None
+
+
+def unfolded(placed: Sequence[Array], clip: Clip) -> list[Array]:
+    """Positions (V, 3) of each part at rest; where it is scaled to nothing then, those at the key of its largest size:
+    they show which of its faces meet."""
+    found = list(placed)
+    modelled = [np.ptp(part.positions, axis=0).max() for part in clip.rig.parts]
+    size = [np.ptp(at, axis=0).max() for at in placed]
+    hidden = [n for n in range(len(found)) if size[n] <= _NOTHING * modelled[n]]
+    if not hidden:
+        return found
+    ends = np.cumsum([len(part.positions) for part in clip.rig.parts])[:-1]
+    times = np.unique(np.concatenate([channel.times for channel in clip.channels]))
+    for time_s in times[np.unique(np.linspace(0, len(times) - 1, _MOST_KEYS).astype(int))]:
+        for number, at in enumerate(np.split(clip.positions(float(time_s)), ends)):
+            length = np.ptp(at, axis=0).max()
+            if number in hidden and size[number] < length < np.inf:
+                found[number], size[number] = at, length
+    return found
 
 
 def first_of_equal(rig: Rig) -> Array:

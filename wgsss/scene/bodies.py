@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
-from wgsss.scene.animation import Animation, choose_clip, first_of_equal
+from wgsss.scene.animation import Animation, choose_clip, first_of_equal, unfolded
 from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
 from wgsss.scene.dressing import Wardrobe, shared, wearable
@@ -90,9 +90,9 @@ def load_file(
 
     `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
     others. `size_mm` scales the longest side of the bounding box, at rest, to a length, whatever the unit. `animation`
-    is the name of the glTF animation that becomes the motion, or its number where it has none: without it the first
-    one, and none where it is "none". `simplify` is the greatest number of faces of a body: one with more is simplified,
-    and loses texture coordinates, normals, vertex colours and motion.
+    is the name of the glTF animation that becomes the motion, or its number: without it the first one, and none where
+    it is "none". `simplify` is the greatest number of faces of a body: one with more is simplified, and loses texture
+    coordinates, normals, vertex colours and motion.
 
     Normals are kept where they are not smooth. Degenerate and duplicate faces and unused vertices are dropped, faces
     wound inwards turned over and holes counted, in one warning for each body. What the file has and wgsss does not use
@@ -128,15 +128,18 @@ class _File:
         if simplify is not None and not (_is_number(simplify) and int(simplify) == simplify and simplify >= 4):
             raise InputError(f"{path}: simplify must be a whole number of faces from 4 up, not {simplify!r}")
         self.path, self.simplify = path, simplify
+        self._said: set[str] = set()
         self.contents = read_file(path)
         try:
-            self._clip = choose_clip(self.contents, animation)
+            self._clip = choose_clip(self.contents, animation, self.say)
             self._placed = placed(self.contents.parts, self.contents.rig)
         except InputError as error:
             raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
         bad = sum(int((~np.isfinite(positions)).any(axis=1).sum()) for positions in self._placed)
         if bad:
             raise InputError(f"{path}: {bad} of {sum(map(len, self._placed))} positions are not finite numbers")
+        if self._clip is not None:
+            self._placed = unfolded(self._placed, self._clip)
         self._boxes = boxes(self.contents.parts, self._placed)
         self.scale = scale(path, self._boxes, mm_per_unit or self.contents.mm_per_unit, size_mm)
         self._wardrobe = Wardrobe(self.say)
@@ -144,7 +147,10 @@ class _File:
             self.say(note)
 
     def say(self, note: str) -> None:
-        warnings.warn(f"{self.path.name}: {note}", Note, stacklevel=2)
+        """Warn of something, once."""
+        if note not in self._said:
+            self._said.add(note)
+            warnings.warn(f"{self.path.name}: {note}", Note, stacklevel=2)
 
     def near_each_other(self, numbers: list[int]) -> list[list[int]]:
         """Parts by number, in groups that can each be one body: what is very far apart cannot."""
@@ -205,12 +211,7 @@ class _File:
             without = ", ".join(what for what, had in lost.items() if had)
             notes.append(f"simplified to {len(faces)} of {len(soup.faces)} faces{without and f', without {without}'}")
             soup, moving = Soup(positions, faces, None, None, None), False
-        most = max(len(np.unique(faces)), len(faces) // 2)
-        if most > MOST_VERTICES:
-            raise InputError(
-                f"{self.path}: {counted(len(faces), 'face')} are more than the device can hold"
-                f" ({2 * MOST_VERTICES}): reduce them with --simplify {MOST_VERTICES}"
-            )
+        self._check_count(len(faces), len(faces) // 2)
         fixed = repair(positions, faces)
         if not len(fixed.faces):
             return None
@@ -221,6 +222,7 @@ class _File:
             self.say(f"{_named(name)}{'; '.join(notes)}")
 
         mesh = _mesh(soup, fixed, f"{self.path.stem} {name}".strip())
+        self._check_count(len(faces), _corners(mesh))
         motion = None
         if moving and self._clip is not None and rig is not None:
             sources, first = fixed.sources(faces), first_of_equal(rig)
@@ -229,6 +231,22 @@ class _File:
             motion = Animation(clip, Blend(first[where.index], where.weight), self.scale, centre)
         maps = self._wardrobe.maps(look)
         return LoadedMesh(mesh, maps, motion, look, self.scale, tuple(centre.tolist()))
+
+    def _check_count(self, faces: int, vertices: int) -> None:
+        if vertices > MOST_VERTICES:
+            raise InputError(
+                f"{self.path}: {counted(faces, 'face')} are more than the device can hold:"
+                f" reduce them with --simplify {min(MOST_VERTICES, faces // 2)}"
+            )
+
+
+def _corners(mesh: Mesh) -> int:
+    """How many vertices the device is to hold: those of a mesh, once for each value of what its corners carry."""
+    carried = [values for values in (mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors) if values is not None]
+    if not carried or 3 * len(mesh.faces) <= MOST_VERTICES:
+        return len(mesh.positions)
+    columns = [np.ascontiguousarray(values.reshape(3 * len(mesh.faces), -1)).view(np.uint32) for values in carried]
+    return len(np.unique(np.concatenate([mesh.faces.reshape(-1, 1).astype(np.uint32), *columns], axis=1), axis=0))
 
 
 def _mesh(soup: Soup, fixed: Repaired, name: str) -> Mesh:

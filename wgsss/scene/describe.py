@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from wgsss.errors import InputError, Note
-from wgsss.scene.animation import NONE
 from wgsss.scene.files import SUFFIXES, read_file
+from wgsss.scene.files.contents import NONE
 from wgsss.scene.images import read_sky
 from wgsss.scene.light import EnvironmentLight
 from wgsss.scene.loading import load_scene

@@ -20,10 +20,10 @@ from typing import Any
 
 from wgsss.errors import InputError
 from wgsss.scene import tables
-from wgsss.scene.animation import NONE
 from wgsss.scene.bodies import load_file
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, DEFAULT_MATERIAL, framing
+from wgsss.scene.files.contents import NONE
 from wgsss.scene.fileview import note_unused
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
 from wgsss.scene.materialfile import choose_material

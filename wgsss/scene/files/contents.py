@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 Triple = tuple[float, float, float]
 
+NONE = "none"
+"""stands for no animation, where one is asked for by its name: none is called so"""
+
 
 @dataclass(frozen=True)
 class Texture:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.scene.files.contents import NONE
 from wgsss.scene.files.gltf_container import damaged
 from wgsss.scene.files.gltf_document import Document
 from wgsss.scene.files.gltf_fields import Item, plain
@@ -23,7 +24,7 @@ Array = npt.NDArray[Any]
 def read_animations(
     path: Path, document: Document, rest: Pose, notes: Notes
 ) -> dict[str, Callable[[], tuple[Channel, ...]]]:
-    """What reads the channels of each animation, by its name, or its number where it has none.
+    """What reads the channels of each animation, by its name, or its number where it has none or that of another one.
 
     Channels that move nothing that can be moved here are left out and noted. What reads the others raises InputError,
     naming the file, where they do not fit together.
@@ -31,12 +32,13 @@ def read_animations(
     found: dict[str, Callable[[], tuple[Channel, ...]]] = {}
     for number, animation in enumerate(document.all("animation")):
         name = animation.get("name")
-        name = name if isinstance(name, str) and name else str(number)
+        if not isinstance(name, str) or not name or name == NONE or name in found:
+            name = str(number) if str(number) not in found else f"animation {number}"
         for channel in animation.items("channels", "channel"):
             reason = _left_out(channel, rest)
             if reason:
                 notes.add(f"animation left out, {reason}:", "channel")
-        found.setdefault(name, partial(_read, path, document, animation, rest, f"animation {plain(name)}"))
+        found[name] = partial(_read, path, document, animation, rest, f"animation {plain(name)}")
     return found
 
 

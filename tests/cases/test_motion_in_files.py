@@ -1,0 +1,231 @@
+"""Animations of glTF files: which one plays, what is hidden for a while, and how rotations are stored."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from balls import ball, ball_primitive, checkered, colored, difference, encoded, loaded, picture, texture, told
+from gltfs import File
+
+from wgsss.errors import InputError
+from wgsss.scene import Scene, load_scene
+
+HALF = math.sqrt(0.5)
+SHOWN = [(1, 1, 1), (0, 0, 0), (1, 1, 1)]
+
+
+def animate(file: File, *channels: tuple[int, str, Any, Any], kind: str = "LINEAR", **fields: Any) -> File:
+    """The file with one more animation, of channels (node, path, times, values)."""
+    samplers, found = [], []
+    for node, path, times, values in channels:
+        shape = {"weights": "SCALAR", "rotation": "VEC4"}.get(path, "VEC3")
+        ends = {"input": file.rows(times, "SCALAR"), "output": file.rows(values, shape)}
+        found.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        samplers.append({**ends, "interpolation": kind})
+    file.add("animations", channels=found, samplers=samplers, **fields)
+    return file
+
+
+def two_balls() -> File:
+    """One at the origin, and one of another material to its right."""
+    file = File()
+    file.node(mesh=file.mesh(ball_primitive(file, colored(file))))
+    other = texture(file, encoded(np.full((2, 2, 3), (20, 160, 40), np.uint8)))
+    green = file.add("materials", name="green", pbrMetallicRoughness={"baseColorTexture": {"index": other}})
+    file.node(mesh=file.mesh(ball_primitive(file, green)), translation=[0.15, 0, 0])
+    return file
+
+
+def seen(scene: Scene, time_s: float) -> tuple[bool, bool]:
+    """Whether anything is seen in the left and in the right half of a picture."""
+    alpha = picture(scene, time=time_s)[..., 3]
+    return bool(alpha[:, :28].any()), bool(alpha[:, 36:].any())
+
+
+# --- hidden for a while ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["lambert", "deon07", "jimenez15", "sam"])
+def test_a_mesh_that_is_scaled_to_nothing_is_not_drawn_then(tmp_path: Path, method: str) -> None:
+    """By STEP, the usual way to hide; at other times it is as without the animation."""
+    file = animate(checkered(), (0, "scale", [0, 0.5, 1], SHOWN), kind="STEP")
+    scene, still = loaded(file, tmp_path, size_mm=22), loaded(checkered(), tmp_path, size_mm=22)
+    knobs: dict[str, Any] = {"deon07": {"map_size": 64}, "sam": {"surface": "screen"}}.get(method, {})
+    for time_s in (0.0, 0.49):
+        assert difference(scene, still, method, 32, time=time_s, **knobs) <= 1
+    hidden = picture(scene, method, 32, time=0.7, **knobs)
+    assert not hidden[..., 3].any() and not hidden[..., :3].any()
+
+
+def test_one_of_two_parts_hides(tmp_path: Path) -> None:
+    scene = loaded(animate(two_balls(), (1, "scale", [0, 0.5, 1], SHOWN), kind="STEP"), tmp_path)
+    assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (True, False)]
+
+
+def test_one_of_two_parts_of_one_body_hides(tmp_path: Path) -> None:
+    file, material = File(), None
+    for shift in (0.0, 0.15):
+        file.node(mesh=file.mesh(ball_primitive(file, material)), translation=[shift, 0, 0])
+    scene = loaded(animate(file, (1, "scale", [0, 0.5, 1], SHOWN), kind="STEP"), tmp_path)
+    assert len(scene.objects) == 1
+    assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (True, False)]
+
+
+def test_both_parts_hide(tmp_path: Path) -> None:
+    file = animate(two_balls(), *((n, "scale", [0, 0.5, 1], SHOWN) for n in (0, 1)), kind="STEP")
+    scene = loaded(file, tmp_path)
+    assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (False, False)]
+
+
+def test_a_scale_through_nothing(tmp_path: Path) -> None:
+    """LINEAR from 1 to -1: small about the middle, nothing at it, and turned inside out after it."""
+    file = animate(checkered(), (0, "scale", [0, 1], [(1, 1, 1), (-1, -1, -1)]))
+    scene = loaded(file, tmp_path)
+    counts = [int((picture(scene, time=time_s)[..., 3] > 0).sum()) for time_s in (0.0, 0.4, 0.5, 0.6, 0.999)]
+    assert counts[2] == 0 < counts[1] < counts[0] / 10
+    assert counts[3] == pytest.approx(counts[1], rel=0.2) and counts[4] == pytest.approx(counts[0], rel=0.02)
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_a_part_that_is_hidden_at_rest_shows_later(tmp_path: Path, joined: bool) -> None:
+    """Its node is scaled to 0, and the animation scales it up."""
+    file = two_balls()
+    if joined:
+        primitives = [mesh["primitives"][0] for mesh in file.tree["meshes"]]
+        primitives[1]["material"] = primitives[0]["material"]
+    file.tree["nodes"][1]["scale"] = [0, 0, 0]
+    animate(file, (1, "scale", [0, 0.5, 1], [(0, 0, 0), (1, 1, 1), (1, 1, 1)]), kind="STEP")
+    path = file.save(tmp_path / "balls.glb")
+    scene, lines = told(path)
+    assert lines == []
+    assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, False), (True, True)]
+    still, lines = told(path, animation="none")
+    assert len(still.objects) == 1 and seen(still, 0.0)[0] and still.bounds[1, 0] < 51
+    assert len(lines) == 1 and "degenerate" in lines[0]
+
+
+def test_all_that_is_hidden_at_rest_shows_later(tmp_path: Path) -> None:
+    file = checkered(node={"scale": [0, 0, 0]})
+    animate(file, (0, "scale", [0, 1], [(0, 0, 0), (1, 1, 1)]))
+    path = file.save(tmp_path / "ball.glb")
+    scene, _ = told(path)
+    assert not picture(scene)[..., 3].any() and picture(scene, time=0.99)[..., 3].any()
+    with pytest.raises(InputError, match="zero size"):
+        load_scene(path, animation="none")
+
+
+# --- which one -------------------------------------------------------------------------------------------------------
+
+
+def shift(path: Path, **options: Any) -> list[float]:
+    """How far the ball is moved in a second, mm."""
+    scene = told(path, **options)[0]
+    return np.round(scene.at(0.5).bounds.mean(axis=0) - scene.bounds.mean(axis=0), 1).tolist()
+
+
+def walks(*names: str | None) -> File:
+    """The ball with animations that move it by 100 mm, 200 mm and so on along x in a second."""
+    file = checkered()
+    for number, name in enumerate(names, start=1):
+        fields = {} if name is None else {"name": name}
+        animate(file, (0, "translation", [0, 1], [(0, 0, 0), (0.2 * number, 0, 0)]), **fields)
+    return file
+
+
+def test_an_animation_by_its_name_and_by_its_number(tmp_path: Path) -> None:
+    path = walks("Walk", "Run", "").save(tmp_path / "ball.glb")
+    assert shift(path) == [100, 0, 0] == shift(path, animation="Walk") == shift(path, animation="0")
+    assert shift(path, animation="Run") == [200, 0, 0] == shift(path, animation="1")
+    assert shift(path, animation="2") == [300, 0, 0]
+    assert load_scene(path, animation="none").objects[0].motion is None
+    with pytest.raises(InputError, match=r"ball\.glb: unknown animation 'run'; did you mean 'Run'\?"):
+        load_scene(path, animation="run")
+    with pytest.raises(InputError, match=r"ball\.glb: unknown animation '3'"):
+        load_scene(path, animation="3")
+
+
+def test_those_that_do_not_play_are_said(tmp_path: Path) -> None:
+    path = walks("Walk", "Run", "").save(tmp_path / "ball.glb")
+    assert told(path)[1] == ["plays Walk, the first of 3 animations (--animation NAME plays another: Run, 2)"]
+    assert told(path, animation="Walk")[1] == told(path, animation="none")[1] == []
+    assert told(walks("Walk"), tmp_path)[1] == []
+
+
+def test_animations_of_one_name_are_told_apart_by_their_numbers(tmp_path: Path) -> None:
+    path = walks("Walk", "Walk", "none", "", "3").save(tmp_path / "ball.glb")
+    assert shift(path, animation="Walk") == [100, 0, 0]
+    assert shift(path, animation="1") == [200, 0, 0]
+    assert shift(path, animation="2") == [300, 0, 0], "'none' stands for no animation"
+    assert sorted(shift(path, animation=name)[0] for name in ("3", "4")) == [400, 500]
+
+
+def test_channels_that_move_nothing_are_counted(tmp_path: Path) -> None:
+    file = checkered()
+    lamp = file.node()
+    lift = [(0, 0, 0), (0, 1, 0)]
+    animate(file, (0, "translation", [0, 1], lift), (lamp, "translation", [0, 1], lift), name="A")
+    scene, lines = told(file, tmp_path)
+    assert scene.objects[0].motion is not None
+    assert lines == ["animation A: 1 channel moves nothing that is drawn"]
+
+
+# --- how it is stored ------------------------------------------------------------------------------------------------
+
+
+def turned(dtype: str, kind: str = "LINEAR") -> File:
+    """The ball turned by a quarter about z in a second, and held."""
+    file = checkered()
+    keys = np.array([(0, 0, 0, 1), (0, 0, HALF, HALF), (0, 0, HALF, HALF)])
+    tops = {"i1": 127, "i2": 32767}
+    output = file.rows(np.round(keys * tops[dtype]) if dtype in tops else keys, "VEC4", dtype, normalized=dtype in tops)
+    sampler = {"input": file.rows([0, 1, 2], "SCALAR"), "output": output, "interpolation": kind}
+    file.add("animations", channels=[{"sampler": 0, "target": {"node": 0, "path": "rotation"}}], samplers=[sampler])
+    return file
+
+
+@pytest.mark.parametrize(("dtype", "near"), [("i1", 1.0), ("i2", 0.01)])
+def test_rotations_of_whole_numbers(tmp_path: Path, dtype: str, near: float) -> None:
+    whole, plain = loaded(turned(dtype), tmp_path), loaded(turned("f4"), tmp_path)
+    for time_s in (0.0, 0.5, 1.5):
+        a, b = (scene.at(time_s).objects[0].mesh.positions for scene in (whole, plain))
+        assert np.abs(a - b).max() < near
+    top = plain.objects[0].mesh.positions[:, 1].argmax()
+    assert plain.at(1.5).objects[0].mesh.positions[top] == pytest.approx((-50, 0, 0), abs=1e-3)
+
+
+def test_a_skin_and_a_morph_in_one(tmp_path: Path) -> None:
+    """The target moves the ball up by 100 mm in the mesh's space, then its joint turns that to the left."""
+    file = checkered()
+    count = len(ball()[0])
+    primitive = file.tree["meshes"][0]["primitives"][0]
+    primitive["attributes"]["JOINTS_0"] = file.rows(np.zeros((count, 4)), "VEC4", "u1")
+    primitive["attributes"]["WEIGHTS_0"] = file.rows(np.tile((255, 0, 0, 0), (count, 1)), "VEC4", "u1", normalized=True)
+    primitive["targets"] = [{"POSITION": file.rows(np.tile((0, 0.1, 0), (count, 1)), "VEC3")}]
+    joint = file.node()
+    file.add("skins", joints=[joint])
+    file.tree["nodes"][0]["skin"] = 0
+    animate(
+        file,
+        (0, "weights", [0, 1, 2], [0, 1, 1]),
+        (joint, "rotation", [0, 1, 2], [(0, 0, 0, 1), (0, 0, HALF, HALF), (0, 0, HALF, HALF)]),
+    )
+    scene = loaded(file, tmp_path)
+    assert scene.at(1.5).bounds.mean(axis=0) == pytest.approx((-100, 0, 0), abs=1)
+    assert scene.at(0.5).bounds.mean(axis=0) == pytest.approx(np.array((-1, 1, 0)) * 50 * HALF, abs=1)
+
+
+def test_a_cubic_spline_overshoots(tmp_path: Path) -> None:
+    """In and out tangents as the file gives them: x(t) is 4 t (1 - t), of which both keys are 0."""
+    file = checkered()
+    rows = [(0, 0, 0), (0, 0, 0), (0.4, 0, 0), (-0.4, 0, 0), (0, 0, 0), (0, 0, 0)]
+    animate(file, (0, "translation", [0, 1], rows), kind="CUBICSPLINE")
+    scene = loaded(file, tmp_path)
+    for time_s in (0.25, 0.5, 0.75):
+        expected = 400 * time_s * (1 - time_s)
+        assert scene.at(time_s).bounds.mean(axis=0)[0] - scene.bounds.mean(axis=0)[0] == pytest.approx(
+            expected, abs=0.1
+        )
