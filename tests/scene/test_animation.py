@@ -242,7 +242,7 @@ def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_pa
     share = np.zeros((12, 4))
     share[:8, 1] = 1
     file.tree.meshes[0].primitives[0].attributes.WEIGHTS_0 = file.add(share, "VEC4")
-    with pytest.warns(UserWarning, match=r"^arm\.glb: .*no joint weights: 4 vertices$"):
+    with pytest.warns(UserWarning, match=r"^arm\.glb: without joint weights.*: 4 vertices$"):
         loaded = load_mesh(file.save(tmp_path / "arm.glb"), mm_per_unit=1)
     still = loaded.mesh.positions[:, 1] == 2
     assert at(loaded, 1)[still] == pytest.approx(loaded.mesh.positions[still])
