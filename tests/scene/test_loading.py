@@ -192,7 +192,7 @@ def test_a_camera_may_be_given_by_its_orbit(folder: Path) -> None:
         ('kind = "point"', "", "[[light]] 2: key 'kind' is missing (one of directional, point, rect, sphere, env"),
         ('kind = "point"', 'kind = "pint"', "[[light]] 2: unknown kind 'pint'; did you mean 'point'?"),
         ("samples = 8", "samples = 8.5", "[[light]] 3: samples must be a whole number from 1 to 256, not 8.5"),
-        ("radius = 5\nradiance", "radius = -5\nradiance", "[[light]] 4: radius must be above 0, not -5"),
+        ("radius = 5\nradiance", "radius = -5\nradiance", "[[light]] 4: radius must be from 1e-06 to 1e+13 (mm)"),
         ("sky/dim.hdr", "sky/dark.hdr", "[[light]] 5: file: "),
         ('file = "sky/dim.hdr"', "file = 7", "[[light]] 5: file must be the path of a file, not 7"),
         ('"box.ply"', '"fox.ply"', "[[object]] 1: mesh: "),
@@ -205,8 +205,8 @@ def test_a_camera_may_be_given_by_its_orbit(folder: Path) -> None:
         ('"Whole Milk"', "5", "[[object]] 1: material must be a name, a file or a table, not 5"),
         ("translate = [10, 0, 0]", "translate = [10, 0]", "[[object]] 1: translate must be three numbers"),
         ('"sphere"\nradius', '"spere"\nradius', "[[object]] 2: unknown shape 'spere'; did you mean 'sphere'?"),
-        ("translate = [10, 0, 0]", "translate = [1e16, 0, 0]", "translate must not be beyond 1e+15 in size, not 1e+16"),
-        ("irradiance = [1, 2, 3]", "irradiance = [1e39, 2, 3]", "irradiance must not be beyond 3e+38 in size"),
+        ("translate = [10, 0, 0]", "translate = [1e16, 0, 0]", "numbers, each from -1e+15 to 1e+15 (mm)"),
+        ("irradiance = [1, 2, 3]", "irradiance = [1e39, 2, 3]", "each from 0 to 1e+09 (W/m^2), not [1e+39"),
         ("irradiance = [1, 2, 3]", f"irradiance = [1{400 * '0'}, 2, 3]", "irradiance must be three numbers"),
         ("eye = [0, 0, 100]", "eye = [0, 1, 1e-300]", "[camera]: eye and target must not be the same point"),
         ("radius = 5\nvertices", "radius = 'wide'\nvertices", "[[object]] 2: radius must be a number, not 'wide'"),
@@ -223,7 +223,7 @@ def test_a_camera_may_be_given_by_its_orbit(folder: Path) -> None:
         ("[0.1, 1]", "[1, 0.1]", "[[object]] 3: [object.material]: gaussians: variances must be positive and asc"),
         ('"bend_and_swell"', '"bend"', "[[object]] 3: [object.motion]: unknown kind 'bend'"),
         ("bend = 30", "bent = 30", "[[object]] 3: [object.motion]: unknown key 'bent'; did you mean 'bend'?"),
-        ("{ kind =", '"swell" # { kind =', "[[object]] 3: [object.motion]: must be a table, not 'swell'"),
+        ("{ kind =", '"swell" # { kind =', "[[object]] 3: [object.motion] must be a table, not 'swell'"),
         ("[[light]]\nkind = \"directional\"", "[light]\nkind = \"directional\"", "not a TOML file"),
     ],
 )  # fmt: skip
@@ -235,11 +235,11 @@ def test_errors_name_file_table_and_key(folder: Path, old: str, new: str, messag
 def test_tables_of_the_wrong_form(folder: Path) -> None:
     assert refused(write(folder, "name = 'x'")) == "there is no [[object]] to render"
     assert refused(write(folder, "[object]\nmesh = 'box.ply'")) == "object must be a list of tables: [[object]]"
-    assert refused(write(folder, f"camera = 3\n{MINIMAL}")) == "[camera]: must be a table, not 3"
+    assert refused(write(folder, f"camera = 3\n{MINIMAL}")) == "[camera] must be a table, not 3"
     (folder / "scene.toml").write_bytes(b"name = '\xff'")
     assert refused(folder / "scene.toml") == "not a TOML file: it is not UTF-8 text"
-    assert refused(write(folder, f"name = {'[' * 5000}")).startswith("not a TOML file: maximum recursion depth")
-    assert refused(write(folder, f"name = {'9' * 5000}")).startswith("not a TOML file: Exceeds the limit")
+    assert refused(write(folder, f"name = {'[' * 5000}")) == "not a TOML file: it is nested too deep"
+    assert refused(write(folder, f"name = {'9' * 5000}")).startswith("not a TOML file: it holds a number")
     (folder / "scene.toml").write_bytes(b"")
     assert refused(folder / "scene.toml") == "the file is empty"
 
@@ -269,7 +269,7 @@ def test_a_material_file_stands_by_itself(folder: Path) -> None:
     assert refused(folder / "scene.toml").startswith(f"[[object]] 1: {path}: unknown key 'sigma_t'")
     with pytest.raises(InputError, match=r"no\.toml: no such file"):
         load_material(folder / "no.toml")
-    with pytest.raises(InputError, match=r"wax\.json: a material file must end in \.toml"):
+    with pytest.raises(InputError, match=r"wax\.json: the file extension of a material file must be \.toml"):
         load_material("wax.json")
 
 
@@ -330,7 +330,7 @@ def test_a_name_that_is_not_known() -> None:
 
 
 def test_options_that_do_not_apply(folder: Path) -> None:
-    assert refused("sphere", size_mm=10) == "size_mm is for mesh files; this scene says how large it is"
+    assert refused("sphere", size_mm=10) == "size_mm is for mesh files, and this is a scene"
     assert "size_mm is for mesh files" in refused(write(folder, MINIMAL), size_mm=10)
     assert refused(folder / "box.ply", vertices=10) == "vertices is for built-in scenes; a file has those it has"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import warnings
 from collections import Counter
@@ -40,7 +41,7 @@ def load_with_warning(path: Path, **options: Any) -> tuple[LoadedMesh, str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_mesh(path, **options)
-    assert len(caught) == 1, "one warning tells it all"
+    assert len(caught) == 1, "one warning tells of all repairs"
     text = str(caught[0].message)
     assert text.startswith(f"{path.name}: ") and "\n" not in text
     return loaded, text
@@ -100,7 +101,7 @@ def test_every_format_gives_the_same_welded_mesh(tmp_path: Path, suffix: str) ->
     assert edge_uses(mesh) == {2: 18}
 
 
-def test_ending_in_capitals(tmp_path: Path) -> None:
+def test_a_file_extension_in_capitals(tmp_path: Path) -> None:
     assert len(quiet_load(export(box(), tmp_path / "box.ply").rename(tmp_path / "BOX.PLY")).mesh.faces) == 12
 
 
@@ -326,15 +327,19 @@ def test_obj_textures(tmp_path: Path) -> None:
 def test_a_texture_that_is_missing_or_damaged_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "box.mtl").write_text("newmtl skin\nmap_Ks shine.png\n")
     (tmp_path / "seam.obj").write_text("mtllib box.mtl\nusemtl skin\n" + SEAM)
-    loaded, text = load_with_warning(tmp_path / "seam.obj")
-    assert text.endswith("; specular texture left out: it is missing or damaged") and loaded.maps.specular is None
+    with pytest.warns(UserWarning) as caught:
+        loaded = load_mesh(tmp_path / "seam.obj")
+    losses = [str(warning.message) for warning in caught if "boundary" not in str(warning.message)]
+    assert len(losses) == 1 and losses[0].startswith("seam.obj: ") and "shine.png" in losses[0]
+    assert loaded.maps.specular is None and loaded.mesh.corner_uvs is not None
 
     path = export(textured(image(1, 2, 3)), tmp_path / "box.glb")
     content = path.read_bytes()
     at = content.index(b"IDAT")
     path.write_bytes(content[: at + 8] + bytes(8) + content[at + 16 :])
     loaded, text = load_with_warning(path)
-    assert text == "box.glb: base_color texture left out: it is missing or damaged" and loaded.maps.base_color is None
+    assert text == "box.glb: base_color texture left out: image 0: damaged, or not an image"
+    assert loaded.maps.base_color is None
 
 
 def test_no_textures_where_trimesh_makes_some_up(tmp_path: Path) -> None:
@@ -474,13 +479,13 @@ def bad(path: Path, **options: Any) -> str:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_files_that_are_not_what_their_ending_says(
+def test_files_that_are_not_what_their_extension_says(
     tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / f"thing{suffix}"
     assert bad(path) == "no such file"
     path.mkdir()
-    assert "cannot be read" in bad(path)
+    assert bad(path) == "this is a folder"
     path.rmdir()
     path.write_bytes(b"")
     assert bad(path) == "the file is empty"
@@ -491,7 +496,7 @@ def test_files_that_are_not_what_their_ending_says(
         b"glTF" + struct.pack("<2I", 2, 9) + bytes(40),
     ):
         path.write_bytes(content)
-        assert "damaged, or not" in bad(path) or "the mesh is empty" in bad(path)
+        assert any(words in bad(path) for words in ("damaged", "truncated", "not ", "the mesh is empty"))
     assert capfd.readouterr() == ("", "") and not caplog.records
 
 
@@ -501,22 +506,22 @@ def test_truncated_files(tmp_path: Path, suffix: str, share: float) -> None:
     path = export(ball(), tmp_path / f"ball{suffix}")
     content = path.read_bytes()
     path.write_bytes(content[: int(len(content) * share)])
-    assert "damaged" in bad(path)
+    assert re.match("damaged|truncated", bad(path))
 
 
 def test_faces_without_vertices(tmp_path: Path) -> None:
     path = tmp_path / "far.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
-    assert "damaged" in bad(path)
+    assert bad(path) == "line 4: vertex 9 does not exist (the file has 3)"
     path = tmp_path / "far.ply"
     path.write_text(PLY_HEAD.format(vertices=3, faces=1, extra="", corner="") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")
-    assert "damaged" in bad(path)
+    assert bad(path) == "row 1 of element face: vertex 7 does not exist (there are 3)"
 
 
 def test_damaged_numbers_in_text(tmp_path: Path) -> None:
     path = tmp_path / "typo.obj"
     path.write_text("v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n")
-    assert "damaged" in bad(path)
+    assert bad(path) == "line 2: 'zero' is not a number"
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "1e39"])
@@ -534,15 +539,15 @@ def test_positions_that_are_not_finite(tmp_path: Path, value: str, suffix: str) 
 
 
 def test_nothing_to_render(tmp_path: Path) -> None:
-    assert "no faces" in bad(write_off(tmp_path / "points.off", TRIANGLE[0], []))
+    assert "the mesh is empty" in bad(write_off(tmp_path / "points.off", TRIANGLE[0], []))
     (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
-    assert "no faces" in bad(tmp_path / "points.obj")
+    assert "the mesh is empty" in bad(tmp_path / "points.obj")
     assert bad(write_off(tmp_path / "spot.off", [(1, 2, 3)] * 3, [(0, 1, 2)])) == "the mesh has zero size"
     line = write_off(tmp_path / "line.off", [(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)])
     assert bad(line) == "the mesh has no area: all 1 faces are degenerate"
 
 
-def test_bad_scales_and_endings(tmp_path: Path) -> None:
+def test_bad_scales_and_file_extensions(tmp_path: Path) -> None:
     path = write_off(tmp_path / "one.off", *TRIANGLE)
     assert bad(path, size_mm=0) == "size_mm must be a number above 0, not 0"
     assert bad(path, mm_per_unit=-1) == "mm_per_unit must be a number above 0, not -1"
@@ -630,7 +635,7 @@ REAL = {  # triangles, boundary edges, has texture coordinates, has hard edges
 
 
 @pytest.mark.parametrize("name", REAL)
-@pytest.mark.filterwarnings("ignore:.*boundary edges", "ignore:.*more than two faces")
+@pytest.mark.filterwarnings("ignore::wgsss.errors.Note")
 def test_real_meshes(data: Path, name: str) -> None:
     triangles, boundary, has_uvs, has_edges = REAL[name]
     mesh = load_mesh(data / name, size_mm=100).mesh
@@ -639,7 +644,7 @@ def test_real_meshes(data: Path, name: str) -> None:
     assert (mesh.corner_uvs is not None, mesh.corner_normals is not None) == (has_uvs, has_edges)
     assert len(np.unique(mesh.positions, axis=0)) == len(mesh.positions), "welded"
     source = trimesh.load_scene(data / name, process=False).to_mesh()
-    assert mesh.area == pytest.approx(source.area * (100 / np.ptp(source.bounds, axis=0).max()) ** 2, rel=1e-5)
+    assert mesh.area == pytest.approx(source.area * (100 / np.ptp(source.bounds, axis=0).max()) ** 2, rel=1e-4)
     np.testing.assert_allclose(np.linalg.norm(mesh.shading_normals, axis=2), 1, atol=1e-5)
 
 

@@ -59,7 +59,7 @@ def load_scene(
         given = [key for key, value in for_mesh.items() if value is not None]
         given += [key for key, on in (("file_camera", file_camera), ("file_lights", file_lights)) if on]
         if given:
-            raise InputError(f"{name}: {given[0]} is for mesh files; this scene says for itself")
+            raise InputError(f"{name}: {given[0]} is for mesh files, and this is a scene")
         scene = _of_name(name, path, chosen, vertices)
     return with_view(scene, camera, lights)
 
