@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import lit, plane
+from scipy.integrate import trapezoid
 
 from wgsss import frame as shared
 from wgsss import wgsl
@@ -253,7 +254,7 @@ def test_kernel_and_pixel_share_the_total():
     found = kernel(profile, 0.8, 1e4)
     r = np.concatenate([[0.0], found.r])
     R = np.concatenate([found.R[:1], found.R])
-    summed = np.trapezoid(2 * np.pi * r[:, None] * R, r, axis=0)
+    summed = trapezoid(2 * np.pi * r[:, None] * R, r, axis=0)
     np.testing.assert_allclose(summed + found.near, profile.total, rtol=1e-3)
     far = found.r > 0.8
     np.testing.assert_allclose(found.R[far][:-1], profile.reflectance(found.r[far][:-1]))

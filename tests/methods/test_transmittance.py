@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import ABOVE, MATTE, WHITE, lit, plane
+from scipy.integrate import trapezoid
 
 from wgsss.frame import begin
 from wgsss.graph import Graph
@@ -80,7 +81,7 @@ def test_table_of_a_dipole_is_its_integral_over_a_plane():
     r = np.geomspace(1e-4, 300, 20_000)
     for d in (0.5, 2.0, 6.0):
         ring = 2 * np.pi * r[:, None] * medium.reflectance(np.hypot(r, d))
-        plane_at_d = np.trapezoid(ring, r, axis=0)
+        plane_at_d = trapezoid(ring, r, axis=0)
         read = [np.interp(d, thickness, column) for column in share.T] * medium.total
         np.testing.assert_allclose(read, plane_at_d, rtol=0.01, atol=2e-5)
 

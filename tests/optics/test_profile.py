@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from wgsss.errors import InputError
 from wgsss.optics import (
@@ -114,8 +115,8 @@ def test_halving_lengths_scales_reflectance_by_four(model):
 def test_total_range_and_line_spread_are_integrals_of_reflectance(model):
     profile = model([0, 1, 2], 1.0)
     r = np.geomspace(1e-6, 2e3, 4000)
-    ring = np.trapezoid(2 * np.pi * np.square(r)[:, None] * profile.reflectance(r), np.log(r), axis=0)
-    line = np.trapezoid(2 * r[:, None] * profile.line_spread(r), np.log(r), axis=0)
+    ring = trapezoid(2 * np.pi * np.square(r)[:, None] * profile.reflectance(r), np.log(r), axis=0)
+    line = trapezoid(2 * r[:, None] * profile.line_spread(r), np.log(r), axis=0)
     np.testing.assert_allclose(ring, profile.total, rtol=2e-3)
     np.testing.assert_allclose(line, profile.total, rtol=2e-3)
     for eps in (0.5, 0.05, 0.01):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import ABOVE, MATTE, lit, plane
-from scipy.integrate import quad
+from scipy.integrate import quad, trapezoid
 from scipy.ndimage import gaussian_filter
 
 from wgsss.bake.samples import Samples
@@ -85,7 +85,7 @@ def test_a_kernel_holds_all_light(profile: Profile, spacing: float) -> None:
         assert kernel.near[channel] == pytest.approx(near, abs=3e-5 * profile.total[channel])
     r = distances(kernel)
     same, opposite = kernel.table[:, :3].astype(float).reshape(2, len(r), 3)
-    beyond = np.pi * (same[0] * r[0] ** 2 + np.trapezoid(same, np.square(r), axis=0))
+    beyond = np.pi * (same[0] * r[0] ** 2 + trapezoid(same, np.square(r), axis=0))
     np.testing.assert_allclose(kernel.near + beyond, profile.total, rtol=2e-4)
     np.testing.assert_allclose(opposite[:-1], profile.reflectance(r[:-1]), rtol=1e-5, atol=1e-12)
     np.testing.assert_array_equal(kernel.table[len(r) - 1 :: len(r)], 0)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, trapezoid
 
 from wgsss.errors import InputError
 from wgsss.optics import Dipole, Layer, Photons, Profile
@@ -327,7 +327,7 @@ def test_counts_are_exact_at_edges(skin):
     half = np.sqrt(0.5 * (skin.edges[100] ** 2 + skin.edges[101] ** 2))  # half of the ring's area
     np.testing.assert_allclose(skin.beyond(half), 0.5 * (beyond[100] + beyond[101]), rtol=1e-12)
     x = np.concatenate([[0.0], np.geomspace(1e-4, 60, 2000)])
-    np.testing.assert_allclose(2 * np.trapezoid(skin.line_spread(x), x, axis=0), skin.total, rtol=2e-3)
+    np.testing.assert_allclose(2 * trapezoid(skin.line_spread(x), x, axis=0), skin.total, rtol=2e-3)
     np.testing.assert_allclose(Profile.beyond(skin, 0.5), skin.beyond(0.5), rtol=0.01)
 
 
