@@ -203,7 +203,9 @@ def _note(notes: list[str], count: int, what: str, did: str) -> None:
 
 
 def counted(count: int, what: str) -> str:
-    """ "1 vertex", "2 vertices"."""
+    """ "1 vertex", "2 vertices", "3 meshes", "4 faces"."""
     if count == 1:
         return f"1 {what}"
+    if what.endswith("sh"):
+        return f"{count} {what}es"
     return f"{count} {what.removesuffix('ex')}{'ices' if what.endswith('ex') else 's'}"

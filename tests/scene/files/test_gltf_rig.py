@@ -222,7 +222,7 @@ def test_animations_are_named_or_numbered_and_read_when_asked_for(tmp_path: Path
         animate(file, (2, "translation", (0, 1), ((1, 0, 0), (2, 0, 0))), name=name)
     file.tree["animations"][-1]["samplers"][0]["input"] = 99
     contents = read(file, tmp_path)
-    assert list(contents.animations) == ["Bend", "1", "3", "Worse"]
+    assert list(contents.animations) == ["Bend", "1", "2", "3", "Worse"]
     assert contents.animations["Bend"]()[0].path == "rotation", "the first of that name"
     with pytest.raises(InputError) as raised:
         contents.animations["Worse"]()

@@ -63,12 +63,24 @@ def read_parts(document: Document, stage: Stage, notes: Notes) -> list[Placed]:
             for primitive in meshes[mesh]:
                 look = looks.of(primitive.item, primitive.uvs)
                 found.append(Placed(node, mesh, primitive, instance, _part(primitive, look, matrix)))
-    hidden = sum(stage.items[node].has("mesh") for node in stage.hidden)
-    if hidden:
-        notes.add("left out, for KHR_node_visibility hides them:", "node", hidden)
+    _note_unshown(document, stage, notes)
     if not found:
         raise InputError("the mesh is empty: it has no faces" + "".join(f"; {line}" for line in notes.lines()))
     return found
+
+
+def _note_unshown(document: Document, stage: Stage, notes: Notes) -> None:
+    """Count the nodes with meshes that the scene does not show, and the meshes that no node places."""
+    meshes = {node: item.get("mesh") for node, item in enumerate(stage.items) if item.has("mesh")}
+    hidden = [node for node in stage.hidden if node in meshes]
+    if hidden:
+        notes.add("left out, for KHR_node_visibility hides them:", "node", len(hidden))
+    outside = meshes.keys() - {*stage.shown, *stage.hidden}
+    if outside:
+        notes.add("left out, for the scene that is shown does not hold them:", "node", len(outside))
+    unplaced = len(document.all("mesh")) - len(set(meshes.values()))
+    if unplaced > 0:
+        notes.add("left out, for no node places them:", "mesh", unplaced)
 
 
 def _part(primitive: Primitive, look: Any, matrix: Array) -> Part:

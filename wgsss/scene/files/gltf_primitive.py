@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wgsss.scene.files.gltf_attributes import FAN, TRIANGLES, Attributes
 from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item
+from wgsss.scene.files.gltf_fields import Item, plain
 from wgsss.scene.files.gltf_notes import Notes
 
 Array = npt.NDArray[Any]
@@ -72,6 +72,9 @@ def read_primitive(document: Document, item: Item, notes: Notes) -> Primitive | 
         values = attributes.read(name, kind, vertices, finite=False)
         return values if kept is None else values[kept]
 
+    for name in attributes.names:
+        if name.startswith("_"):
+            notes.add(f"attribute {plain(name)} left out:", "primitive")
     normals, uvs = _normals(attributes, rows, notes), _uvs(attributes, rows, notes)
     colors = _colors(attributes, rows, notes)
     return Primitive(item, attributes, vertices, kept, positions, faces, normals, uvs, colors)

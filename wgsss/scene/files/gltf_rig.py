@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import as_whole
+from wgsss.scene.files.gltf_fields import as_whole, plain
 from wgsss.scene.files.gltf_nodes import Stage
 from wgsss.scene.files.gltf_notes import Notes
 from wgsss.scene.files.gltf_parts import Placed
@@ -18,6 +18,8 @@ from wgsss.scene.files.gltf_primitive import Primitive
 from wgsss.scene.rig import Part, Rig, Skin
 
 Array = npt.NDArray[Any]
+
+_MORPHED = {"POSITION", "NORMAL", "TANGENT"}  # the last two follow from the first
 
 
 def read_rig(document: Document, stage: Stage, placed: Sequence[Placed], notes: Notes) -> Rig | None:
@@ -39,7 +41,7 @@ def read_rig(document: Document, stage: Stage, placed: Sequence[Placed], notes: 
         primitive, what = one.primitive, one.primitive.item.where
         key = (one.mesh, id(primitive))
         if key not in targets:
-            targets[key] = _targets(document, primitive)
+            targets[key] = _targets(document, primitive, notes)
         expected = len(stage.nodes.rest.weights[one.node])
         if len(targets[key]) != expected:
             raise InputError(f"{what}: it has {len(targets[key])} morph targets where its mesh has {expected}")
@@ -51,9 +53,11 @@ def read_rig(document: Document, stage: Stage, placed: Sequence[Placed], notes: 
     return Rig(stage.nodes, tuple(parts))
 
 
-def _targets(document: Document, primitive: Primitive) -> Array:
+def _targets(document: Document, primitive: Primitive, notes: Notes) -> Array:
     """float32 (T, V, 3). Only positions: normals are made from the posed surface, as for every motion."""
     items = primitive.item.items("targets", "morph target")
+    for name in sorted({name for target in items for name in target.values} - _MORPHED):
+        notes.add(f"{plain(name)} of morph targets left out:", "primitive")
     found: Array = np.zeros((len(items), len(primitive.positions), 3), np.float32)
     for number, target in enumerate(items):
         if target.has("POSITION"):
