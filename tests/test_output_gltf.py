@@ -179,7 +179,7 @@ def test_the_command_writes_either_or_both(tmp_path: Path, capsys: pytest.Captur
     [
         (["export", "sphere"], "give --mitsuba DIR, --gltf FILE.glb, or both"),
         (["export", "sphere", "--gltf", "ball.obj", "--mitsuba", "ball"], "ball.obj: the output must end in .glb"),
-        (["export", "sphere", "--gltf", "ball.glb", "--size", "0x0"], "--size must be at least 1x1, not 0x0"),
+        (["export", "sphere", "--gltf", "ball.glb", "--size", "0x0"], "1 to 8192 pixels a side, not 0x0"),
         (["export", "ear", "--gltf", "ear.glb", "--mitsuba", "ear"], "needs sigma_a and sigma_s_prime, not gaussians"),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -21,6 +21,8 @@ from wgsss.stage import Body, Stage
 
 Matrix = npt.NDArray[Any]
 
+NEAREST, CLOSEST = 1e-3, 1e-6
+"""Of the greatest depth: from where on things are drawn that the camera is inside of, and from where on any."""
 BLOOM_SIGMA = 1.0 / 64.0
 """The standard deviation of bloom, of the image's height."""
 
@@ -113,16 +115,27 @@ def _view(scene: Scene, size: tuple[int, int]) -> View:
     corners = np.array(np.meshgrid(*scene.bounds.T, indexing="ij")).reshape(3, -1).T
     to_view = camera.view()
     depths = -(corners @ to_view[2, :3] + to_view[2, 3])
-    margin = 0.01 * max(float(np.ptp(depths)), 1e-3)
-    near, far = float(depths.min()) - margin, float(depths.max()) + margin
+    near, far = float(depths.min()) - _margin(depths), float(depths.max()) + _margin(depths)
     orthographic = isinstance(camera, OrthographicCamera)
     if not orthographic:  # inside or in front of the scene
         far = max(far, 1e-3)
-        near = max(near, 1e-4 * far)
+        if near < NEAREST * far:
+            near = _nearest([-(o.placed @ to_view[2, :3] + to_view[2, 3]) for o in scene.objects], far)
     world_to_clip = camera.projection(size[0] / size[1], near, far) @ to_view
     towards = np.subtract(camera.eye, camera.target)
     eye = (*(towards / np.linalg.norm(towards)), 0.0) if orthographic else (*camera.eye, 1.0)
     return View(world_to_clip, np.linalg.inv(world_to_clip), eye)
+
+
+def _margin(depths: Matrix) -> float:
+    return 0.01 * max(float(np.ptp(depths)), 1e-3)
+
+
+def _nearest(depths: Sequence[Matrix], far: float) -> float:
+    """From which depth on objects are drawn whose vertices are at these depths: all that lie in front of the camera are
+    drawn, but what the camera is inside of is cut off, or depths farther away would not be told apart."""
+    lowest = [float(of_one.min()) - _margin(of_one) for of_one in depths if of_one.max() > 0.0]
+    return max(min((low if low > 0.0 else NEAREST * far for low in lowest), default=far / 2), CLOSEST * far)
 
 
 def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> SimpleNamespace:

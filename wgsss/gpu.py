@@ -73,10 +73,10 @@ SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what i
 }
 
 
-def check_size(nbytes: int, limit: str, what: str) -> None:
-    """Raise InputError where a buffer is larger than one of LIMITS."""
-    if nbytes > LIMITS[limit]:
-        needed, most = -(-nbytes >> 20), LIMITS[limit] >> 20
+def check_size(nbytes: int, most_bytes: int, what: str) -> None:
+    """Raise InputError where a buffer is larger than the device takes."""
+    if nbytes > most_bytes:
+        needed, most = -(-nbytes >> 20), most_bytes >> 20
         raise InputError(
             f"{what} needs {needed} MiB in one buffer, more than the {most} MiB that devices take: the mesh is too"
             " large, reduce it with --simplify"
@@ -155,6 +155,7 @@ class Gpu:
             required_features=["timestamp-query"] if self.has_timestamps else [], required_limits=LIMITS
         )
         self.queue = self.device.queue
+        self.most_bound = LIMITS["max-storage-buffer-binding-size"]
         self._shaders: dict[str, Any] = {}
         self._pipelines: dict[Any, Any] = {}
         self._samplers: dict[str, Any] = {}
@@ -198,7 +199,8 @@ class Gpu:
         usage = (
             wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.INDEX | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
         )
-        check_size(data.nbytes if isinstance(data, np.ndarray) else len(data), "max-buffer-size", "a mesh's data")
+        nbytes = data.nbytes if isinstance(data, np.ndarray) else len(data)
+        check_size(nbytes, LIMITS["max-buffer-size"], "a mesh's data")
         raw = data if isinstance(data, bytes) else np.ascontiguousarray(data).tobytes()
         return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
 
@@ -287,7 +289,7 @@ class Gpu:
 
     def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Any, Any]:
         """A buffer of at least `nbytes` from the pool, and the key to give it back with."""
-        check_size(nbytes, "max-buffer-size", "a pass")
+        check_size(nbytes, LIMITS["max-buffer-size"], "a pass")
         key = (1 << max(nbytes - 1, 255).bit_length(), usage)
         if self._free[key]:
             return self._free[key].pop(), key

@@ -336,7 +336,7 @@ class Graph:
                     resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
                 if binding.space == "storage":
                     size = handle.resource.nbytes if handle else resource.size
-                    check_size(size, "max-storage-buffer-binding-size", f"{item.name}: {name}")
+                    check_size(size, self.gpu.most_bound, f"{item.name}: {name}")
             entries.append({"binding": binding.number, "resource": resource})
         group = self.gpu.device.create_bind_group(layout=layout, entries=entries) if entries else None
         return state, group

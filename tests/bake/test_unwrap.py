@@ -16,8 +16,7 @@ from wgsss.bake.charts import INSIDE, charts
 from wgsss.bake.unwrap import Surface, is_unique, split, unwrap
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
-from wgsss.scene import Mesh
-from wgsss.scene.mesh import load_mesh
+from wgsss.scene import Mesh, load_mesh
 
 
 @pytest.fixture(params=LIBRARIES)

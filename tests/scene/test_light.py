@@ -30,7 +30,7 @@ RECT: dict[str, Any] = {
         (
             DirectionalLight,
             {"direction": (0, 0, 1), "irradiance": (1, -1, 1)},
-            "irradiance must be .* from 0 to 1e\\+09 \\(W/m\\^2\\)",
+            "irradiance must be .* from 0 to 1e\\+12 \\(W/m\\^2\\)",
         ),
         (DirectionalLight, {"direction": (0, math.nan, 1), "irradiance": (1, 1, 1)}, "direction must be three numbers"),
         (PointLight, {"position": (0, 0), "intensity": (1, 1, 1)}, "position must be three numbers"),

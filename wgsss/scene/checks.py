@@ -29,7 +29,7 @@ ANGLE = 1e9
 """degrees, or degrees per second, either sign"""
 SECONDS = 1e9
 """of times, either sign"""
-BRIGHTEST = 1e9
+BRIGHTEST = 1e12
 """W/(m^2 sr) of a radiance, W/m^2 of an irradiance: the sun has 2e7 and 1.4e3"""
 STRONGEST = 1e30
 """W/sr of an intensity"""
