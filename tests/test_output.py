@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from PIL import Image as Picture
 
 from wgsss.errors import InputError, RenderError
-from wgsss.output import check_output, replacing, save, save_frames
+from wgsss.output import FORMATS, check_output, replacing, save, save_frames
 from wgsss.rendering import Image
 
 WIDTH, HEIGHT = 7, 5  # odd, and not square
@@ -165,8 +166,8 @@ def test_a_film_that_fails_on_the_way_is_not_there(image: Image, tmp_path: Path)
 @pytest.mark.parametrize(
     ("path", "said"),
     [
-        ("a.jpg", r"a\.jpg: the output must end in \.png or \.exr or \.npy or \.mp4"),
-        ("a", "must end in"),
+        ("a.jpg", r"a\.jpg: the file extension must be \.png or \.exr or \.npy or \.mp4"),
+        ("a", "the file extension must be"),
         ("folder.png", "is a folder"),
         ("nowhere/a.png", "there is no folder '.*nowhere'"),
         ("a" * 300 + ".png", "cannot be written"),
@@ -195,3 +196,32 @@ def test_files_have_the_permissions_of_any_new_file(image: Image, tmp_path: Path
     save(image, tmp_path / "a.png")
     subprocess.run(["touch", tmp_path / "b"], check=True)
     assert (tmp_path / "a.png").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("kind", ["folder", "fifo", "link to a device"])
+def test_what_is_no_file_is_not_replaced(tmp_path: Path, suffix: str, kind: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/null")
+    with pytest.raises(InputError, match=r"this is (a folder|not a regular file)$"):
+        check_output(path)
+    assert list(tmp_path.iterdir()) == [path] and not path.is_file()
+
+
+def test_a_frame_whose_place_is_taken_is_not_written(image: Image, tmp_path: Path) -> None:
+    (tmp_path / "a.0002.png").mkdir()
+    with pytest.raises(InputError, match=r"0002\.png: this is a folder"):
+        save_frames([image, image], tmp_path / "a.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.0001.png", "a.0002.png"]
+
+
+def test_names_may_be_as_long_as_the_file_system_has_them(image: Image, tmp_path: Path) -> None:
+    assert save(image, tmp_path / f"{'x' * 251}.png")[0].exists()
+    with pytest.raises(InputError, match=r"cannot be written \(File name too long"):
+        save(image, tmp_path / f"{'y' * 250}.npy")
+    assert [path.name[0] for path in tmp_path.iterdir()] == ["x"]

@@ -155,7 +155,7 @@ def test_what_gltf_has_no_place_for_is_told(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_where_it_cannot_be(tmp_path: Path) -> None:
-    for path, message in ((tmp_path / "a.gltf", "must end in .glb"), (tmp_path / "none" / "a.glb", "no folder")):
+    for path, message in ((tmp_path / "a.gltf", "extension must be .glb"), (tmp_path / "none" / "a.glb", "no folder")):
         with pytest.raises(InputError, match=message):
             export(scene(), path)
     assert list(tmp_path.iterdir()) == []
@@ -178,8 +178,11 @@ def test_the_command_writes_either_or_both(tmp_path: Path, capsys: pytest.Captur
     ("arguments", "message"),
     [
         (["export", "sphere"], "give --mitsuba DIR, --gltf FILE.glb, or both"),
-        (["export", "sphere", "--gltf", "ball.obj", "--mitsuba", "ball"], "ball.obj: the output must end in .glb"),
-        (["export", "sphere", "--gltf", "ball.glb", "--size", "0x0"], "1 to 8192 pixels a side, not 0x0"),
+        (["export", "sphere", "--gltf", "ball.obj", "--mitsuba", "ball"], "ball.obj: the file extension must be .glb"),
+        (
+            ["export", "sphere", "--gltf", "ball.glb", "--size", "0x0"],
+            "the image size must be 1 to 8192 pixels a side, not 0x0",
+        ),
         (["export", "ear", "--gltf", "ear.glb", "--mitsuba", "ear"], "needs sigma_a and sigma_s_prime, not gaussians"),
     ],
 )

@@ -112,7 +112,7 @@ def test_plot(tmp_path: Path, capsys):
         (["skin", "--photons", "10"], "'skin' by the model '.*': the material has no sigma_a and sigma_s_prime"),
         (["skin1", "--photons", "0"], "'0' is not a whole number"),
         (["skin1", "--csv", "--json"], "one of them"),
-        (["skin1", "-o", "a.pdf"], "must end in .png or .svg"),
+        (["skin1", "-o", "a.pdf"], "the file extension must be .png or .svg"),
         (["skin1", "-o", "/no/a.png"], "there is no folder"),
     ],
 )

@@ -5,9 +5,11 @@ A file appears whole or not at all: it is written under another name in the same
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import tempfile
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,10 +42,9 @@ def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
     """
     path = Path(path)
     if path.suffix.lower() not in formats:
-        raise InputError(f"{path}: the output must end in {' or '.join(formats)}")
+        raise InputError(f"{path}: the file extension must be {' or '.join(formats)}")
     with _told(path):
-        if path.is_dir():
-            raise InputError(f"{path}: this is a folder")
+        _check_place(path)
         if not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder '{path.parent}'")
         trial = _temporary(path)  # permissions do not tell everything, so try
@@ -63,6 +64,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     temporary = [_temporary(path) for path in paths]
     try:
         with _told(paths[0]):
+            for path in paths:
+                _check_place(path)
             yield temporary
             for source, path in zip(temporary, paths, strict=True):
                 os.replace(source, path)
@@ -71,8 +74,15 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
             source.unlink(missing_ok=True)
 
 
+def _check_place(path: Path) -> None:
+    """Raise InputError where a file would take the place of what is none: a folder, a device, a link to one."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: this is {'a folder' if path.is_dir() else 'not a regular file'}")
+
+
 def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    """A name of its own for this process, as short as any name may need it."""
+    return path.with_name(f".{zlib.crc32(os.fsencode(path.name)):08x}.{os.getpid()}{path.suffix}")
 
 
 @contextmanager
@@ -166,8 +176,9 @@ def _write_exr(image: Image, layers: dict[str, Array], file: Path) -> None:
             channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., i], np.float32)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **_labels(image)}
     try:
-        with OpenEXR.File(header, channels) as exr:
-            exr.write(str(file))
+        with OpenEXR.File(header, channels) as exr, io.BytesIO() as stream:  # it takes no name that is not text
+            exr.write(stream)
+            file.write_bytes(stream.getvalue())
     except RuntimeError as error:
         raise OSError(" ".join(str(error).split())) from None
 

@@ -16,6 +16,7 @@ from wgsss.graph import Graph, Handle
 from wgsss.methods import Method, make_method, name_of
 from wgsss.scene import Scene, checks
 from wgsss.stage import Stage
+from wgsss.text import escaped
 
 Array = npt.NDArray[Any]
 
@@ -120,7 +121,7 @@ class Renderer:
     def _metadata(self) -> dict[str, str]:
         scene, method = self.stage.scene, self.method
         return {
-            "scene": scene.name,
+            "scene": escaped(scene.name),
             "method": name_of(method),
             "knobs": " ".join(f"{knob}={value}" for knob, value in vars(method).items()),
             "adapter": self.gpu.name,

@@ -94,8 +94,8 @@ def _about(case: Any) -> list[str]:
     lines = []
     for number, layer in enumerate(case.stack if case.material.stack else [], start=1):
         depth = "without end" if layer.thickness == float("inf") else f"{layer.thickness:g} mm thick"
-        which = f", layer {number}" if len(case.stack) > 1 else ""
-        lines.append(f"{one_line(case.material.name)}{which}: eta {layer.eta:g}, {depth}")
+        place = f", layer {number}" if len(case.stack) > 1 else ""
+        lines.append(f"{one_line(case.material.name)}{place}: eta {layer.eta:g}, {depth}")
         quantities = {
             "sigma_a": (layer.sigma_a, "1/mm"),
             "sigma_s'": (layer.sigma_s_prime, "1/mm"),
