@@ -84,7 +84,7 @@ def choose(choices: Mapping[str, Any], name: Any, what: str, where: str) -> Any:
 def check_keys(table: Any, known: Iterable[str] | None, where: str) -> None:
     """Raise InputError unless this is a table without any key but those known; None stands for any."""
     if not isinstance(table, dict):
-        raise InputError(f"{where}: must be a table, not {shown(table)}")
+        raise InputError(f"{where} must be a table, not {shown(table)}")
     for key in table:
         if known is not None and key not in known:
             raise at(where, unknown("key", key, known))
