@@ -173,6 +173,19 @@ def test_channels_that_move_nothing_are_counted(tmp_path: Path) -> None:
     assert lines == ["animation A: 1 channel moves nothing that is drawn"]
 
 
+def test_parts_begin_anew_together_and_still_ones_do_not_move(tmp_path: Path) -> None:
+    """A period is that of the whole animation, even if the longest channel moves nothing that is drawn."""
+    file = two_balls()
+    file.node(mesh=file.mesh(ball_primitive(file)), translation=[0.3, 0, 0])
+    lamp = file.node()
+    lift = [(0, 0, 0), (0, 0.1, 0)]
+    channels = [(n, "translation", [0, end], lift) for n, end in ((0, 1), (1, 2), (lamp, 5))]
+    objects = told(animate(file, *channels), tmp_path)[0].objects
+    assert [o.motion and o.motion.period_s for o in objects] == [5, 5, None]
+    tops = [[float(o.at(time_s).placed[:, 1].max()) for o in objects] for time_s in (2.5, 5.5)]
+    assert tops[0][:2] == pytest.approx([150, 150], abs=1) and tops[1][:2] == pytest.approx([100, 75], abs=1)
+
+
 # --- how it is stored ------------------------------------------------------------------------------------------------
 
 

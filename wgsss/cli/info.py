@@ -13,7 +13,7 @@ _PACKAGES = (
     *("imageio", "pillow", "matplotlib", "embreex", "libigl", "xatlas", "uvunwrap", "flip-evaluator", "mitsuba"),
     *("imgui-bundle", "DracoPy", "meshopt"),
 )
-_FILE = "a mesh, a scene file (.toml) or an environment image (.hdr .exr)"
+_FILE = "a mesh, a scene or material file (.toml) or an environment image (.hdr .exr)"
 
 
 def declare(commands: Any) -> None:
@@ -28,10 +28,11 @@ def run(args: Any) -> None:
     if args.file is None:
         _about_this_machine(args)
     else:
+        from wgsss.cli.filetext import text_of
         from wgsss.scene.describe import describe
 
         found = describe(args.file)
-        arguments.tell(args, found, _description(found))
+        arguments.tell(args, found, text_of(found))
 
 
 def _about_this_machine(args: Any) -> None:
@@ -84,45 +85,3 @@ def _text(result: dict[str, Any]) -> str:
     rows.append(["cache", f"{cache['folder']}: {cache['entries']} entries, {cache['bytes'] / 1e6:.1f} MB"])
     rows += [[name, f"{n['asked']} (adapter: {n['adapter']})"] for name, n in result.get("limits", {}).items()]
     return arguments.table(rows)
-
-
-def _description(found: dict[str, Any]) -> str:
-    rows = [["file", found["file"]], ["holds", found["kind"]]]
-    if "pixels" in found:
-        width, height = found["pixels"]
-        mean = " ".join(f"{value:.3g}" for value in found["mean_radiance"])
-        rows += [["size", f"{width} x {height} pixels"], ["mean radiance", f"{mean} W/(m^2 sr)"]]
-        rows.append(["greatest", f"{found['greatest_radiance']:.4g} W/(m^2 sr)"])
-    else:
-        rows.append(["size", f"{_lengths(found['size_mm'])} mm"])
-    if "mm_per_unit" in found:
-        unit = f"{found['unit']}, as the format says" if found["unit"] else "not stated, taken as a millimetre"
-        rows.append(["unit", f"{unit} (--size-mm X makes the longest side X mm)"])
-    for body in found.get("bodies", ()):
-        rows.append(["part", _part(body)])
-    for name, used in (("lights", "--file-lights uses them"), ("cameras", "--file-camera uses the first")):
-        if found.get(name):
-            kinds = ", ".join(" ".join(filter(None, (thing["kind"], thing["name"]))) for thing in found[name])
-            rows.append([name, kinds + (f" ({used})" if "mm_per_unit" in found else "")])
-    if found.get("animations"):
-        rows.append(
-            ["animations", f"{', '.join(found['animations'])}; plays {found['plays']} (--animation NAME or none)"]
-        )
-    rows += [["note", note] for note in found["notes"]] or [["note", "all that it holds is used"]]
-    return arguments.table(rows)
-
-
-def _part(body: dict[str, Any]) -> str:
-    about = [f"{body['name']}: {body['vertices']} vertices, {body['faces']} faces, {_lengths(body['size_mm'])} mm"]
-    about.append("closed" if body["closed"] else "not closed")
-    reach = "" if body["reach_mm"] is None else f" (light spreads {body['reach_mm']:g} mm)"
-    about.append(f"in {body['material']}{reach}")
-    if body["base_color"] != [1.0, 1.0, 1.0]:
-        about.append(f"base colour {' '.join(f'{value:.3g}' for value in body['base_color'])}")
-    about += [f"{name} texture {width} x {height}" for name, (width, height) in body["textures"].items()]
-    about += [text for key, text in (("vertex_colors", "colours of vertices"), ("moves", "moves")) if body[key]]
-    return ", ".join(about)
-
-
-def _lengths(sides: list[float]) -> str:
-    return " x ".join(f"{side:g}" for side in sides)

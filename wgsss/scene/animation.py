@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,15 @@ class Clip:
     name: str
     rig: Rig
     channels: tuple[Channel, ...]
-    """at least one"""
+    """those that move the rig's vertices, at least one"""
+    duration_s: float
+    """seconds from time 0 to the animation's last key, whatever that moves: all parts begin anew together"""
 
-    @property
-    def duration_s(self) -> float:
-        """Seconds from time 0 to the last key."""
-        return max(float(channel.times[-1]) for channel in self.channels)
+    def of(self, rig: Rig) -> Clip | None:
+        """The same for some of the parts; None where they do not move."""
+        movers, morphed = rig.movers(), {part.node for part in rig.parts}
+        used = tuple(c for c in self.channels if c.node in (morphed if c.path == "weights" else movers))
+        return replace(self, rig=rig, channels=used) if used else None
 
     def positions(self, time_s: float) -> Array:
         """float64 (V, 3): all vertices of the rig, in the file's unit, at a time from 0 to the last key."""
@@ -95,14 +98,14 @@ def choose_clip(contents: Contents, name: str | None, say: Callable[[str], None]
     if name not in names:
         raise unknown("animation", name, [*names, NONE])
     channels = contents.animations[name]()
-    if contents.rig is None:
+    if contents.rig is None or not channels:
         return None
-    movers, morphed = contents.rig.movers(), {part.node for part in contents.rig.parts}
-    used = tuple(c for c in channels if c.node in (morphed if c.path == "weights" else movers))
-    idle = len(channels) - len(used)
+    whole = Clip(name, contents.rig, channels, max(float(channel.times[-1]) for channel in channels))
+    found = whole.of(contents.rig)
+    idle = len(channels) - (0 if found is None else len(found.channels))
     if idle:
         say(f"animation {name}: {counted(idle, 'channel')} {'moves' if idle == 1 else 'move'} nothing that is drawn")
-    return Clip(name, contents.rig, used) if used else None
+    return found
 
 
 def unfolded(placed: Sequence[Array], clip: Clip) -> list[Array]:

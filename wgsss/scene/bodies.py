@@ -17,7 +17,7 @@ from wgsss.errors import InputError, Note
 from wgsss.scene.animation import Animation, choose_clip, first_of_equal, unfolded
 from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
-from wgsss.scene.dressing import Wardrobe, shared, wearable
+from wgsss.scene.dressing import Wardrobe, coordinates, shared, wearable
 from wgsss.scene.files import read_file
 from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
@@ -104,9 +104,9 @@ def load_file(
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
     looks = [wearable(part, file.say) for part in file.contents.parts]
-    alike: dict[Look, list[int]] = {}
-    for number, look in enumerate(looks):
-        alike.setdefault(replace(look, name=""), []).append(number)
+    alike: dict[Any, list[int]] = {}
+    for number, (part, look) in enumerate(zip(file.contents.parts, looks, strict=True)):
+        alike.setdefault((replace(look, name=""), coordinates(part, look) is None), []).append(number)
     groups = [(looks[numbers[0]], near) for numbers in alike.values() for near in file.near_each_other(numbers)]
     return LoadedFile(file.bodies(groups), file.contents.lights, file.contents.cameras)
 
@@ -199,18 +199,18 @@ class _File:
         """A soup as a mesh with all that it wears; None where no face has an area."""
         centre, positions = centred(soup.positions * self.scale, soup.faces)
         faces, notes = soup.faces, []
-        moving = self._clip is not None
+        clip = None if self._clip is None or rig is None else self._clip.of(rig)
         if self.simplify is not None and len(faces) > self.simplify:
             positions, faces = simplified(positions, faces, self.simplify)
             lost = {
                 "texture coordinates": soup.uvs is not None,
                 "normals": soup.normals is not None,
                 "vertex colours": soup.colors is not None,
-                "motion": moving,
+                "motion": clip is not None,
             }
             without = ", ".join(what for what, had in lost.items() if had)
             notes.append(f"simplified to {len(faces)} of {len(soup.faces)} faces{without and f', without {without}'}")
-            soup, moving = Soup(positions, faces, None, None, None), False
+            soup, clip = Soup(positions, faces, None, None, None), None
         self._check_count(len(faces), len(faces) // 2)
         fixed = repair(positions, faces)
         if not len(fixed.faces):
@@ -224,10 +224,9 @@ class _File:
         mesh = _mesh(soup, fixed, f"{self.path.stem} {name}".strip())
         self._check_count(len(faces), _corners(mesh))
         motion = None
-        if moving and self._clip is not None and rig is not None:
-            sources, first = fixed.sources(faces), first_of_equal(rig)
+        if clip is not None:
+            sources, first = fixed.sources(faces), first_of_equal(clip.rig)
             where = Blend.same(sources) if soup.sources is None else soup.sources.at(sources)
-            clip = replace(self._clip, rig=rig)
             motion = Animation(clip, Blend(first[where.index], where.weight), self.scale, centre)
         maps = self._wardrobe.maps(look)
         return LoadedMesh(mesh, maps, motion, look, self.scale, tuple(centre.tolist()))

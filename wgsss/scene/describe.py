@@ -1,4 +1,4 @@
-"""What a mesh file or a scene file holds, what of it is used, and what is not."""
+"""What a file holds, a mesh, a scene, a material or an environment image, and what of it is not used."""
 
 from __future__ import annotations
 
@@ -9,23 +9,27 @@ from typing import Any
 import numpy as np
 
 from wgsss.errors import InputError, Note
+from wgsss.scene.animation import Animation
 from wgsss.scene.files import SUFFIXES, read_file
 from wgsss.scene.files.contents import NONE
 from wgsss.scene.images import read_sky
-from wgsss.scene.light import EnvironmentLight
-from wgsss.scene.loading import load_scene
+from wgsss.scene.loading import load_material, load_scene
 from wgsss.scene.material import SLOTS, Material
 from wgsss.scene.scene import Object
+from wgsss.scene.scenefile import CAMERAS, LIGHTS
+from wgsss.scene.tables import read_toml
+from wgsss.text import one_line
 
 Described = dict[str, Any]
 
 SKIES = (".hdr", ".exr")
+FORMATS = {".glb": "glTF", ".gltf": "glTF", ".obj": "OBJ", ".ply": "PLY", ".stl": "STL", ".off": "OFF"}
 
 
 def describe(path: Path) -> Described:
     """What a file holds, as plain data. `notes` says, a line each, what is repaired, left out or taken otherwise.
 
-    Raises InputError for a file that cannot be read, and of another kind than a mesh, a scene or an environment image.
+    Raises InputError for a file that cannot be read, and for one of another kind.
     """
     suffix = path.suffix.lower()
     with warnings.catch_warnings(record=True) as caught:
@@ -34,38 +38,42 @@ def describe(path: Path) -> Described:
         if suffix in SUFFIXES:
             found = _mesh_file(path)
         elif suffix == ".toml":
-            found = _scene_file(path)
+            found = _toml_file(path)
         elif suffix in SKIES:
             found = _sky(path)
         else:
             kinds = ", ".join((*SUFFIXES, ".toml", *SKIES))
             raise InputError(f"{path}: not a kind of file that can be described ({kinds})")
-    found["notes"] = list(dict.fromkeys(" ".join(str(warning.message).split()) for warning in caught))
+    found["notes"] = list(dict.fromkeys(one_line(warning.message) for warning in caught))
     return found
 
 
 def _mesh_file(path: Path) -> Described:
     contents = read_file(path)
     scene = load_scene(path)
-    animations = list(contents.animations)
+    motions = [thing.motion for thing in scene.objects if isinstance(thing.motion, Animation)]
     return {
         "file": str(path),
-        "kind": f"mesh ({path.suffix.lower()[1:]})",
+        "kind": f"mesh ({FORMATS[path.suffix.lower()]})",
         "unit": "metre" if contents.states_unit else None,
         "mm_per_unit": contents.mm_per_unit,
         "size_mm": _size(scene.objects),
         "bodies": [_body(thing) for thing in scene.objects],
-        "lights": [{"name": light.name, "kind": light.kind} for light in contents.lights],
+        "lights": [{"kind": light.kind, "name": light.name, "file": None} for light in contents.lights],
         "cameras": [
-            {"name": camera.name, "kind": "perspective" if camera.height is None else "orthographic"}
+            {"kind": "perspective" if camera.height is None else "orthographic", "name": camera.name, "file": None}
             for camera in contents.cameras
         ],
-        "animations": animations,
-        "plays": animations[0] if animations else NONE,
+        "animations": list(contents.animations),
+        "plays": motions[0].clip.name if motions else NONE,
     }
 
 
-def _scene_file(path: Path) -> Described:
+def _toml_file(path: Path) -> Described:
+    table = read_toml(path)
+    if table and not table.keys() & {"object", "light", "camera"}:
+        material = load_material(path)
+        return {"file": str(path), "kind": f"material {material.name}", "reach_mm": _reach(material)}
     scene = load_scene(path)
     return {
         "file": str(path),
@@ -73,10 +81,14 @@ def _scene_file(path: Path) -> Described:
         "size_mm": _size(scene.objects),
         "bodies": [_body(thing) for thing in scene.objects],
         "lights": [
-            {"name": light.file or "" if isinstance(light, EnvironmentLight) else "", "kind": type(light).__name__}
-            for light in scene.lights
+            {"kind": _kind(light, LIGHTS), "name": "", "file": getattr(light, "file", None)} for light in scene.lights
         ],
+        "cameras": [{"kind": _kind(scene.camera, CAMERAS), "name": "", "file": None}],
     }
+
+
+def _kind(thing: Any, kinds: dict[str, Any]) -> str:
+    return next(name for name, kind in kinds.items() if isinstance(thing, kind))
 
 
 def _sky(path: Path) -> Described:
