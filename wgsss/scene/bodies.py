@@ -17,7 +17,7 @@ from wgsss.errors import InputError, Note
 from wgsss.scene.animation import Animation, choose_clip, first_of_equal, unfolded
 from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
-from wgsss.scene.dressing import Wardrobe, coordinates, shared, wearable
+from wgsss.scene.dressing import Wardrobe, coordinates, lead, shared, wearable
 from wgsss.scene.files import read_file
 from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
@@ -203,6 +203,7 @@ class _File:
         if self.simplify is not None and len(faces) > self.simplify:
             positions, faces = simplified(positions, faces, self.simplify)
             lost = {
+                "textures": soup.uvs is not None and lead(look) is not None,
                 "texture coordinates": soup.uvs is not None,
                 "normals": soup.normals is not None,
                 "vertex colours": soup.colors is not None,
@@ -229,6 +230,8 @@ class _File:
             where = Blend.same(sources) if soup.sources is None else soup.sources.at(sources)
             motion = Animation(clip, Blend(first[where.index], where.weight), self.scale, centre)
         maps = self._wardrobe.maps(look)
+        if mesh.corner_uvs is None:
+            maps = replace(maps, base_color=None, normal=None, specular=None)
         return LoadedMesh(mesh, maps, motion, look, self.scale, tuple(centre.tolist()))
 
     def _check_count(self, faces: int, vertices: int) -> None:

@@ -7,6 +7,7 @@ is read. The mesh then has the leaf's outline, and no method, shadow map or refe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,9 @@ from wgsss.scene.blend import Blend
 
 Array = npt.NDArray[Any]
 
-STEP = 3.0
-"""Length in texels at and below which edges near the outline are no longer split: a chord of a smooth outline is then
-off by a fraction of a texel."""
+STEP = 1.5
+"""Length in texels at and below which edges near the outline are no longer split: stems of two texels then keep their
+width, while at twice the length they lose a sixth of it."""
 MOST_FACES = 400_000
 """Faces beyond which no more edges are split, so that a large noisy mask cannot fill the memory."""
 _ROUNDS = 24  # of splitting in half: more than any texture needs
@@ -60,16 +61,22 @@ class Mask:
             ends.append(np.mod(at, size).astype(np.int64))
         return ends[0], ends[1], share
 
-    def straddled(self, low: Array, high: Array) -> Array:
-        """Whether boxes of texture coordinates (N, 2) hold texels on both sides of the cutoff."""
+    @cached_property
+    def _counts(self) -> tuple[Array, tuple[int, int]]:
+        """How many texels at or above the cutoff are above and left of each texel of two by two periods of the mask,
+        and the size of a period."""
         inside = self.alpha >= self.cutoff
         for axis, wrap in ((1, self.wrap[0]), (0, self.wrap[1])):
             if wrap == "mirror":
                 inside = np.concatenate([inside, np.flip(inside, axis)], axis)
         height, width = inside.shape
-        tiled = np.tile(inside, (2, 2))
         count = np.zeros((2 * height + 1, 2 * width + 1), np.int64)
-        count[1:, 1:] = tiled.cumsum(axis=0).cumsum(axis=1)
+        count[1:, 1:] = np.tile(inside, (2, 2)).cumsum(axis=0).cumsum(axis=1)
+        return count, (height, width)
+
+    def straddled(self, low: Array, high: Array) -> Array:
+        """Whether boxes of texture coordinates (N, 2) hold texels on both sides of the cutoff."""
+        count, (height, width) = self._counts
         spans = []
         for i, period in ((0, width), (1, height)):
             size = self.alpha.shape[1 - i]
@@ -103,12 +110,16 @@ def cut(positions: Array, faces: Array, uvs: Array, mask: Mask) -> tuple[Blend, 
         a, b = uvs[ends[:, 0]], uvs[ends[:, 1]]
         length = np.linalg.norm((b - a) * size, axis=1)
         around = np.abs(b - a).max(axis=1, keepdims=True) / 2
-        split = (length > STEP) & mask.straddled(np.minimum(a, b) - around, np.maximum(a, b) + around)
+        near = mask.straddled(np.minimum(a, b) - around, np.maximum(a, b) + around)
         # The same edge on the other side of a seam is split with it.
-        pairs = np.sort(same[ends], axis=1)
-        twins = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1)
-        split = np.bincount(twins, split)[twins] > 0
-        if not split.any() or len(faces) + 2 * split.sum() > MOST_FACES:
+        twins = _distinct(np.sort(same[ends], axis=1))[1]
+        for step in (STEP, 2 * STEP, 4 * STEP):  # of too many the longest
+            split = np.bincount(twins, near & (length > step))[twins] > 0
+            if len(faces) + 2 * split.sum() <= MOST_FACES:
+                break
+        else:
+            break
+        if not split.any():
             break
         chosen = ends[split]
         middle = np.full(len(ends), -1)
@@ -136,8 +147,15 @@ def cut(positions: Array, faces: Array, uvs: Array, mask: Mask) -> tuple[Blend, 
 def _edges(faces: Array) -> tuple[Array, Array]:
     """Distinct edges (E, 2), and for each face (F, 3) those from its first corner to its second, and so on."""
     ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    distinct, index = np.unique(ends, axis=0, return_inverse=True)
+    distinct, index = _distinct(ends)
     return distinct, index.reshape(-1, 3)
+
+
+def _distinct(pairs: Array) -> tuple[Array, Array]:
+    """Distinct rows of pairs of whole numbers (N, 2), and for each row its index."""
+    stride = int(pairs.max(initial=0)) + 1
+    found, index = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
+    return np.stack(np.divmod(found, stride), axis=1), index.reshape(-1)
 
 
 def _refined(faces: Array, middle: Array) -> Array:
