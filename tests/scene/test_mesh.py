@@ -280,6 +280,23 @@ def test_hard_edges_of_the_file_are_kept(tmp_path: Path) -> None:
         np.testing.assert_allclose(mesh.corner_normals, np.repeat(own[:, None], 3, 1), atol=1e-6)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_hard_edges_of_faces_that_are_turned_over_are_kept(tmp_path: Path, sign: int) -> None:
+    """Whether the file's normals point outwards or go with the winding: what is drawn is a box with hard edges."""
+    flat = box()
+    flat.unmerge_vertices()
+    normals = sign * np.repeat(flat.face_normals, 3, axis=0)
+    lines = ["v {} {} {}".format(*v) for v in flat.vertices] + ["vn {} {} {}".format(*n) for n in normals]
+    lines += ["f " + " ".join(f"{c}//{c}" for c in face[::-1] + 1) for face in flat.faces]
+    (tmp_path / "box.obj").write_text("\n".join(lines))
+    loaded, text = load_with_warning(tmp_path / "box.obj")
+    assert text == "box.obj: 12 faces wound inwards, turned over"
+    mesh = loaded.mesh
+    own = mesh.face_normals / np.linalg.norm(mesh.face_normals, axis=1, keepdims=True)
+    assert mesh.corner_normals is not None and volume(mesh) == pytest.approx(24)
+    np.testing.assert_allclose(mesh.corner_normals, np.repeat(own[:, None], 3, 1), atol=1e-6)
+
+
 def test_smooth_normals_of_the_file_are_our_own(tmp_path: Path) -> None:
     path = tmp_path / "ball.ply"
     sphere = ball()

@@ -23,16 +23,14 @@ from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.places import boxes, centred, clusters, scale
-from wgsss.scene.repair import Repaired, counted, repair
+from wgsss.scene.repair import counted, repair
 from wgsss.scene.rig import Rig
 from wgsss.scene.simplify import simplified
 from wgsss.scene.soup import Soup, joined, placed
+from wgsss.scene.surface import device_vertices, surface
 
 Array = npt.NDArray[Any]
 
-# A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
-# or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
-OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
 MOST_VERTICES = 2_796_202
 """What a storage binding of 128 MiB, WebGPU's default limit, holds of the 48 bytes of a vertex."""
 
@@ -222,8 +220,9 @@ class _File:
         if notes:
             self.say(f"{_named(name)}{'; '.join(notes)}")
 
-        mesh = _mesh(soup, fixed, f"{self.path.stem} {name}".strip())
-        self._check_count(len(faces), _corners(mesh))
+        mesh = surface(soup, fixed, f"{self.path.stem} {name}".strip())
+        if 3 * len(faces) > MOST_VERTICES:  # as it may be where all corners differ
+            self._check_count(len(faces), device_vertices(mesh))
         motion = None
         if clip is not None:
             sources, first = fixed.sources(faces), first_of_equal(clip.rig)
@@ -240,37 +239,6 @@ class _File:
                 f"{self.path}: {counted(faces, 'face')} are more than the device can hold:"
                 f" reduce them with --simplify {min(MOST_VERTICES, faces // 2)}"
             )
-
-
-def _corners(mesh: Mesh) -> int:
-    """How many vertices the device is to hold: those of a mesh, once for each value of what its corners carry."""
-    carried = [values for values in (mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors) if values is not None]
-    if not carried or 3 * len(mesh.faces) <= MOST_VERTICES:
-        return len(mesh.positions)
-    columns = [np.ascontiguousarray(values.reshape(3 * len(mesh.faces), -1)).view(np.uint32) for values in carried]
-    return len(np.unique(np.concatenate([mesh.faces.reshape(-1, 1).astype(np.uint32), *columns], axis=1), axis=0))
-
-
-def _mesh(soup: Soup, fixed: Repaired, name: str) -> Mesh:
-    def corners(values: Array | None) -> Array | None:
-        return None if values is None else fixed.corners(values[soup.faces])
-
-    mesh = Mesh(
-        fixed.positions, fixed.faces, corner_uvs=corners(soup.uvs), corner_colors=corners(soup.colors), name=name
-    )
-    normals = corners(soup.normals)
-    if normals is not None and not fixed.flipped.any():
-        mesh = replace(mesh, corner_normals=_own_normals(mesh, normals))
-    return mesh
-
-
-def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
-    """A file's normals (F, 3, 3), made unit, with smooth ones where it has none; None where they are smooth anyway."""
-    length = np.linalg.norm(normals, axis=2, keepdims=True)
-    smooth = mesh.normals[mesh.faces]
-    unit = np.where(np.isfinite(length) & (length > 1e-6), normals / np.maximum(length, 1e-6), smooth)
-    far = np.einsum("ijk,ijk->ij", unit, smooth) < math.cos(math.radians(OWN_NORMALS_DEGREES))
-    return unit if far.mean() > OWN_NORMALS_SHARE else None
 
 
 def _named(name: str) -> str:
