@@ -7,10 +7,10 @@ BIN := .venv/bin
 DEMO := ear milk gyroid statue leaf
 BENCH := sphere ear milk
 
-.PHONY: help setup demo test bench lint clean
+.PHONY: help setup demo test test-lowest bench lint clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile
 
 setup: ## virtual environment, dependencies and, where there is none, a software Vulkan driver
 	@.ci/setup
@@ -28,6 +28,9 @@ demo: setup ## render pictures into out/
 test: setup ## run the tests
 	@$(BIN)/pytest -q --durations=10 -n 2 --dist loadfile # much of a test runs on one core
 
+test-lowest: setup ## run the tests with the oldest versions of other packages that are allowed
+	@.ci/lowest
+
 bench: setup ## measure what things cost, and chart speed against accuracy into out/bench/
 	@$(BIN)/python tests/benchmarks.py
 	@mkdir -p out
@@ -39,5 +42,5 @@ lint: setup ## check style and types
 	$(BIN)/mypy
 
 clean: ## remove what the targets made
-	rm -rf .venv out dist build .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv .venv-lowest out dist build .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
