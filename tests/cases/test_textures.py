@@ -122,6 +122,21 @@ def test_of_two_textures_over_two_sets_the_second_is_left_out_and_said(tmp_path:
     assert difference(scene, plain) <= 1
 
 
+@pytest.mark.parametrize(("spread", "left_out"), [(1, False), (2, True)])
+def test_two_textures_whose_samplers_differ(tmp_path: Path, spread: float, left_out: bool) -> None:
+    """That does not matter where no coordinate is beyond the image; else the second one is left out and said."""
+    file = File()
+    file.add("samplers", wrapS=33071, wrapT=33071)
+    bumps = texture(file, encoded(np.full((4, 4, 3), (128, 128, 255), np.uint8)))
+    base = {"baseColorTexture": {"index": texture(file, sampler=0)}, "metallicFactor": 0}
+    material = file.add("materials", pbrMetallicRoughness=base, normalTexture={"index": bumps})
+    attributes = {"TEXCOORD_0": file.rows(ball()[1] * spread, "VEC2")}
+    file.node(mesh=file.mesh(ball_primitive(file, material, attributes=attributes)))
+    scene, lines = told(file, tmp_path)
+    assert (scene.objects[0].material.maps.normal is None) == left_out
+    assert lines == (["normal texture image 0 left out: it repeats otherwise than image 1"] if left_out else [])
+
+
 def test_two_textures_over_one_set_are_both_worn(tmp_path: Path) -> None:
     file = File()
     slant = np.full((2, 2, 3), (200, 128, 230), np.uint8)

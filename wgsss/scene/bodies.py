@@ -21,7 +21,7 @@ from wgsss.scene.dressing import Wardrobe, coordinates, lead, shared, wearable
 from wgsss.scene.files import read_file
 from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
-from wgsss.scene.mesh import Mesh
+from wgsss.scene.mesh import MIN_SIZE, Mesh
 from wgsss.scene.places import boxes, centred, clusters, scale
 from wgsss.scene.repair import counted, repair
 from wgsss.scene.rig import Rig
@@ -172,7 +172,7 @@ class _File:
             if body is not None:
                 found.append(body)
             elif len(groups) > 1:
-                self.say(f"{_named(name)}left out: all its faces are degenerate")
+                self.say(f"{_named(name)}left out: it has no area")
         if not found:
             count = sum(len(part.faces) for part in self.contents.parts)
             why = f"all {count} faces are degenerate" if why.startswith("all") else why
@@ -194,7 +194,7 @@ class _File:
         return self.contents.splits or len(parts) > 1 or any(part.uvs or part.normals is not None for part in parts)
 
     def _body(self, look: Look, name: str, soup: Soup, rig: Rig | None, splits: bool) -> LoadedMesh | None:
-        """A soup as a mesh with all that it wears; None where no face has an area."""
+        """A soup as a mesh with all that it wears; None where no face has an area, or nothing a size."""
         centre, positions = centred(soup.positions * self.scale, soup.faces)
         faces, notes = soup.faces, []
         clip = None if self._clip is None or rig is None else self._clip.of(rig)
@@ -212,7 +212,7 @@ class _File:
             soup, clip = Soup(positions, faces, None, None, None), None
         self._check_count(len(faces), len(faces) // 2)
         fixed = repair(positions, faces)
-        if not len(fixed.faces):
+        if not len(fixed.faces) or np.ptp(fixed.positions, axis=0).max() < MIN_SIZE:
             return None
         if fixed.welded and not splits:
             notes.append(f"{counted(fixed.welded, 'duplicate vertex')} welded")

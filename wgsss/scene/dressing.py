@@ -14,7 +14,7 @@ from wgsss.errors import InputError
 from wgsss.scene.cutout import Mask
 from wgsss.scene.files.contents import Look, Part, Texture
 from wgsss.scene.images import read_map
-from wgsss.scene.material import SLOTS, Maps
+from wgsss.scene.material import SLOTS, STEEPEST, Maps
 
 Array = npt.NDArray[Any]
 Say = Callable[[str], None]
@@ -24,6 +24,9 @@ FARTHEST_UV = 1e6
 
 _SQUARED = 256
 """Texels on a side below which a mask that is not interpolated is refined, so that its corners are not cut off."""
+
+
+_ROUNDING = 1e-4  # of texture coordinates at the border of the image
 
 
 def lead(look: Look) -> Texture | None:
@@ -43,10 +46,22 @@ def wearable(part: Part, say: Say) -> Look:
         return replace(look, base_color_map=None, normal_map=None, specular_map=None, cutoff=None)
     for slot in SLOTS:
         texture = _texture(look, slot)
-        if texture is not None and _place(texture) != _place(first):
+        if texture is None:
+            continue
+        if (texture.coordinates, texture.transform) != (first.coordinates, first.transform):
             say(f"{slot} texture {texture.name} left out: it lies over other coordinates than {first.name}")
             look = _without(look, slot)
+        elif texture.wrap != first.wrap and not _within(coordinates(part, look)):
+            say(f"{slot} texture {texture.name} left out: it repeats otherwise than {first.name}")
+            look = _without(look, slot)
+        elif texture.nearest != first.nearest:
+            say(f"{slot} texture {texture.name} is interpolated, or not, as {first.name} is")
     return look
+
+
+def _within(uvs: Array | None) -> bool:
+    """Whether texture coordinates (V, 2) keep to the image, so that nothing of it repeats."""
+    return uvs is None or bool(((uvs >= -_ROUNDING) & (uvs <= 1 + _ROUNDING)).all())
 
 
 def shared(looks: list[Look], say: Say) -> Look:
@@ -88,7 +103,10 @@ class Wardrobe:
         first = lead(look)
         if first is not None:
             found = replace(found, wrap=first.wrap, nearest=first.nearest)
-        return replace(found, normal_scale=look.normal_scale, tint=look.base_color)
+        scale = min(max(look.normal_scale, -STEEPEST), STEEPEST)
+        if scale != look.normal_scale:
+            self._say(f"a normal scale of {look.normal_scale:g} taken as {scale:g}")
+        return replace(found, normal_scale=scale, tint=look.base_color)
 
     def mask(self, look: Look) -> Mask | None:
         """Where the surface is, if the look's alpha says so."""
@@ -129,7 +147,3 @@ def _texture(look: Look, slot: str) -> Texture | None:
 def _without(look: Look, slot: str) -> Look:
     changed: dict[str, Any] = {f"{slot}_map": None}
     return replace(look, **changed)
-
-
-def _place(texture: Texture) -> tuple[Any, ...]:
-    return texture.coordinates, texture.transform, texture.wrap

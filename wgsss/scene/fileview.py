@@ -8,19 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.errors import Note
+from wgsss.errors import InputError, Note
 from wgsss.scene.bodies import LoadedFile
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.light import DirectionalLight, Light, PointLight
 from wgsss.scene.repair import counted
 from wgsss.scene.scene import Object
+from wgsss.scene.tables import at
 
 MM_PER_METRE = 1000.0
 NARROWEST, WIDEST = 0.05, 170.0  # degrees, of a camera's view
 
 
 def lights_of(file: LoadedFile) -> list[Light]:
-    """All lights of a file, lengths in mm.
+    """All lights of a file, lengths in mm. Raises InputError, naming the light, for one that no light can be.
 
     Where the file's unit is taken for another length than a metre, a point light's intensity is scaled, so that what
     arrives at the mesh stays the same.
@@ -28,11 +29,14 @@ def lights_of(file: LoadedFile) -> list[Light]:
     scale = file.bodies[0].mm_per_unit
     found: list[Light] = []
     for light in file.lights:
-        if light.kind == "directional":
-            found.append(DirectionalLight(light.direction, light.power))
-        else:
-            intensity = np.asarray(light.power) * (scale / MM_PER_METRE) ** 2
-            found.append(PointLight(_triple(np.asarray(light.position) * scale), _triple(intensity)))
+        try:
+            if light.kind == "directional":
+                found.append(DirectionalLight(light.direction, light.power))
+            else:
+                intensity = np.asarray(light.power) * (scale / MM_PER_METRE) ** 2
+                found.append(PointLight(_triple(np.asarray(light.position) * scale), _triple(intensity)))
+        except InputError as error:
+            raise at(light.name, error) from None
     return found
 
 
@@ -48,9 +52,12 @@ def camera_in(file: LoadedFile, things: Sequence[Object]) -> Camera | None:
     ahead = float((middle - eye) @ forward)
     target = eye + max(ahead, float(np.ptp(points, axis=0).max()), 1e-3) * forward
     place: dict[str, Any] = {"eye": _triple(eye), "target": _triple(target), "up": seen.up}
-    if seen.height is not None:
-        return OrthographicCamera(**place, height=seen.height * scale)
-    return PerspectiveCamera(**place, fov=min(max(seen.fov or 0.0, NARROWEST), WIDEST))
+    try:
+        if seen.height is not None:
+            return OrthographicCamera(**place, height=seen.height * scale)
+        return PerspectiveCamera(**place, fov=min(max(seen.fov or 0.0, NARROWEST), WIDEST))
+    except InputError as error:
+        raise at(seen.name, error) from None
 
 
 def note_unused(where: str, count: int, what: str, why: str) -> None:

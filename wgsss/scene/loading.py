@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from wgsss.errors import InputError, unknown
-from wgsss.scene.bodies import load_file
+from wgsss.scene.bodies import LoadedFile, load_file
 from wgsss.scene.camera import Camera
 from wgsss.scene.defaults import DEFAULT_LIGHTS, framing
 from wgsss.scene.fileview import camera_in, lights_of, note_unused
@@ -17,7 +17,7 @@ from wgsss.scene.materialfile import Chosen, choose_material
 from wgsss.scene.meshobjects import objects_of
 from wgsss.scene.scene import Object, Scene
 from wgsss.scene.scenefile import camera_of, light_of, read_scene
-from wgsss.scene.tables import Table
+from wgsss.scene.tables import Table, at
 
 
 def load_scene(
@@ -85,12 +85,19 @@ def _of_name(name: str, path: Path, chosen: Chosen | None, vertices: int | None)
 
 def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: bool, file_lights: bool) -> Scene:
     file = load_file(path, **options)
-    things = objects_of(file, chosen, path.name)
+    try:
+        return _seen(path, file, objects_of(file, chosen, path.name), file_camera, file_lights)
+    except InputError as error:
+        raise at(str(path), error) from None
+
+
+def _seen(path: Path, file: LoadedFile, things: tuple[Object, ...], file_camera: bool, file_lights: bool) -> Scene:
+    """The scene of a mesh file's objects, lit and seen by what it holds itself, where that is asked for."""
     lights: Sequence[Light] = DEFAULT_LIGHTS
     if file_lights:
         lights = lights_of(file)
         if not lights:
-            raise InputError(f"{path}: it holds no lights")
+            raise InputError("it holds no lights")
     else:
         uses = " (--file-lights uses it)" if len(file.lights) == 1 else " (--file-lights uses them)"
         note_unused(path.name, len(file.lights), "light", uses)
@@ -98,7 +105,7 @@ def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: boo
     if file_camera:
         camera = camera_in(file, things)
         if camera is None:
-            raise InputError(f"{path}: it holds no camera")
+            raise InputError("it holds no camera")
         note_unused(path.name, len(file.cameras) - 1, "camera", ": the first one is")
     else:
         uses = " (--file-camera uses it)" if len(file.cameras) == 1 else " (--file-camera uses the first)"

@@ -20,6 +20,8 @@ from wgsss.text import shortened
 WRAPS = ("repeat", "clamp", "mirror")  # in the order of wgsl/mesh.wgsl
 SLOTS = ("base_color", "normal", "specular")
 """the textures there are"""
+STEEPEST = 100.0
+"""scale of a normal map's slopes, beyond which all of them are vertical"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class Maps:
     def __post_init__(self) -> None:
         if len(self.wrap) != 2 or any(wrap not in WRAPS for wrap in self.wrap):
             raise InputError(f"wrap must be two of {', '.join(WRAPS)}, not {self.wrap!r}")
-        checks.number(self, "normal_scale", -100, 100)
+        checks.number(self, "normal_scale", -STEEPEST, STEEPEST)
         checks.triple(self, "tint", 0, 1)
         for name, channels in (("base_color", 3), ("normal", 3), ("specular", None)):
             pixels = getattr(self, name)

@@ -185,7 +185,8 @@ def as_floats(values: Array, normalized: bool, what: str, finite: bool = True) -
     if values.dtype.kind == "f":
         if finite and not np.isfinite(values).all():
             raise InputError(f"{what} holds a number that is not finite")
-        return values.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # of a signalling NaN
+            return values.astype(np.float64)
     if normalized:
         return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
     return values.astype(np.int64)
