@@ -19,7 +19,7 @@ from packaging.version import Version
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 WITHOUT = {"viewer": "macOS x86_64", "reference": "macOS x86_64"}
-"""Extras that a system goes without: imgui-bundle and Mitsuba no longer have wheels for Macs with Intel's processors."""
+"""Extras that a system goes without: imgui-bundle and Mitsuba have no wheels for Macs with an Intel processor."""
 LISTER = ROOT / "tests" / "wheels.py"
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")

@@ -302,5 +302,5 @@ def test_switches_are_on_or_off():
     for word in ("on", "TRUE", "yes", "1", True, 1):
         assert make_method("jimenez08", {"culled": word}).culled is True, word
     for word in ("", "maybe", "2", None):
-        with pytest.raises(InputError, match=f"jimenez08: culled must be on or off, not '{word}'"):
+        with pytest.raises(InputError, match=f"jimenez08: culled must be on or off, not {word!r}"):
             make_method("jimenez08", {"culled": word})

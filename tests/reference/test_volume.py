@@ -196,7 +196,7 @@ def test_what_is_not_shared_is_told_in_one_line(tmp_path):
 
 def test_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="this is not a folder"):
         export(ball(SKY), tmp_path / "file" / "folder", (8, 8))
 
 

@@ -206,7 +206,7 @@ def test_a_camera_may_be_given_by_its_orbit(folder: Path) -> None:
         ("translate = [10, 0, 0]", "translate = [10, 0]", "[[object]] 1: translate must be three numbers"),
         ('"sphere"\nradius', '"spere"\nradius', "[[object]] 2: unknown shape 'spere'; did you mean 'sphere'?"),
         ("translate = [10, 0, 0]", "translate = [1e16, 0, 0]", "numbers, each from -1e+15 to 1e+15 (mm)"),
-        ("irradiance = [1, 2, 3]", "irradiance = [1e39, 2, 3]", "each from 0 to 1e+09 (W/m^2), not [1e+39"),
+        ("irradiance = [1, 2, 3]", "irradiance = [1e39, 2, 3]", "each from 0 to 1e+12 (W/m^2), not [1e+39"),
         ("irradiance = [1, 2, 3]", f"irradiance = [1{400 * '0'}, 2, 3]", "irradiance must be three numbers"),
         ("eye = [0, 0, 100]", "eye = [0, 1, 1e-300]", "[camera]: eye and target must not be the same point"),
         ("radius = 5\nvertices", "radius = 'wide'\nvertices", "[[object]] 2: radius must be a number, not 'wide'"),

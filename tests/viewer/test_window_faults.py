@@ -24,6 +24,7 @@ take, lost = Context._get_current_texture, []
 
 def try_to_take(context):
     if lost:
+        print(f"lost: {lost[-1]}", flush=True)
         raise lost.pop()
     return take(context)
 
@@ -108,7 +109,7 @@ def test_a_lost_surface_is_drawn_on_again(window: Desk) -> None:
     os.kill(window.program.pid, signal.SIGUSR1)
     window.do("mousemove", *RIGHT, "key", "3")
     window.settled(lambda screen: np.array_equal(pictures(screen), right))
-    assert "no surface" in window.said(), "a frame was lost"
+    assert "lost: no surface" in window.said(), "a frame was lost"
     window.do("key", "1")
 
 
