@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from balls import checkered, difference, loaded, picture, told
 from gltfs import File
 
+from wgsss.cli import main
 from wgsss.errors import InputError
 from wgsss.scene import DirectionalLight, OrthographicCamera, PerspectiveCamera, PointLight, load_scene
 
@@ -205,3 +207,38 @@ def test_lights_and_cameras_in_a_scene_file_are_counted(tmp_path: Path) -> None:
         "ball.glb: 1 camera of the file is not used: a scene file has its own",
         "ball.glb: 1 light of the file is not used: a scene file has its own",
     ]
+
+
+def test_the_command_line_asks_for_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One picture with the file's lights and camera, another animation than the first, and fewer faces."""
+    file = with_lights((SUN, {}))
+    file.node(camera=file.add("cameras", **LENS), translation=[0, 0, 0.4])
+    times, places = file.rows([0, 1], "SCALAR"), file.rows([(0, 0, 0), (0.2, 0, 0)], "VEC3")
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    for name in ("Rest", "Walk"):
+        file.add("animations", name=name, channels=[channel], samplers=[{"input": times, "output": places}])
+    path = file.save(tmp_path / "ball.glb")
+    picture_of = [
+        "render",
+        str(path),
+        "--method",
+        "lambert",
+        "--size",
+        "8x8",
+        "-o",
+        str(tmp_path / "ball.png"),
+        "--json",
+    ]
+    assert main([*picture_of, "--file-lights", "--file-camera", "--animation", "Walk"]) == 0
+    assert json.loads(capsys.readouterr().out)["warnings"] == []
+    assert main([*picture_of, "--simplify", "100", "--animation", "none"]) == 0
+    lines = json.loads(capsys.readouterr().out)["warnings"]
+    assert [line.split(": ")[1].split()[0] for line in lines] == ["simplified", "1", "1"]
+    for options, words in (
+        (["--animation", "Run"], "unknown animation 'Run'"),
+        (["--file-camera", "--camera", "{kind = 'perspective', eye = [0, 0, 9], target = [0, 0, 0]}"], "exclude"),
+        (["--simplify", "3"], "simplify"),
+    ):
+        assert main([*picture_of, *options]) == 2
+        err = capsys.readouterr().err.splitlines()
+        assert words in err[-1] and err[-1].startswith("wgsss: error: ")
