@@ -18,9 +18,9 @@ from wgsss import __version__
 from wgsss.errors import Note
 from wgsss.output import check_output, replacing
 from wgsss.scene import DirectionalLight, Maps, Material, Mesh, OrthographicCamera, PointLight, Scene
-from wgsss.scene.files.gltf_media import VOLUME, VOLUME_SCATTER, written
-from wgsss.scene.files.gltf_textures import LINEAR, NEAREST, WRAPS
-from wgsss.scene.files.gltf_writer import Writer
+from wgsss.scene.files.gltf.media import VOLUME, VOLUME_SCATTER, written
+from wgsss.scene.files.gltf.textures import LINEAR, NEAREST, WRAPS
+from wgsss.scene.files.gltf.writer import Writer
 from wgsss.scene.light import Light
 from wgsss.scene.material import SLOTS
 

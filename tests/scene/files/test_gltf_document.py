@@ -11,7 +11,7 @@ import pytest
 from gltfs import CODES, File
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_document import Document
+from wgsss.scene.files.gltf.document import Document
 
 
 def document(file: File, path: Path) -> Document:

@@ -13,9 +13,9 @@ from gltfs import File, png
 from wgsss.scene import MATERIALS
 from wgsss.scene.files.contents import Contents, Medium
 from wgsss.scene.files.gltf import read_gltf
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_media import read_medium, written
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.media import read_medium, written
+from wgsss.scene.files.gltf.notes import Notes
 
 VOLUME, SCATTER, OLD = "KHR_materials_volume", "KHR_materials_scatter", "KHR_materials_volume_scatter"
 DIFFUSE = "KHR_materials_diffuse_transmission"

@@ -8,7 +8,7 @@ import pytest
 
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Look, Texture
-from wgsss.scene.files.mtl import read_materials
+from wgsss.scene.files.obj.mtl import read_materials
 
 
 def read(folder: Path, text: str, *images: str) -> tuple[Look, list[str]]:

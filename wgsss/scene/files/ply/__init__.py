@@ -19,9 +19,9 @@ from wgsss.scene.files.colors import linear_colors
 from wgsss.scene.files.contents import Contents, Look, Part, Texture
 from wgsss.scene.files.corners import finite_normals, finite_uvs, upside_down, vertices_of
 from wgsss.scene.files.locate import locate
-from wgsss.scene.files.plydata import Table, read_tables
-from wgsss.scene.files.plyfaces import Faces, read_faces
-from wgsss.scene.files.plyheader import Element, Header, read_header
+from wgsss.scene.files.ply.data import Table, read_tables
+from wgsss.scene.files.ply.faces import Faces, read_faces
+from wgsss.scene.files.ply.header import Element, Header, read_header
 from wgsss.scene.files.text import file_bytes, shown
 from wgsss.scene.files.triangulate import triangulate
 

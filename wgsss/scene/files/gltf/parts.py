@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Part
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_looks import Looks
-from wgsss.scene.files.gltf_nodes import Stage
-from wgsss.scene.files.gltf_notes import Notes
-from wgsss.scene.files.gltf_primitive import Primitive, read_primitive
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.looks import Looks
+from wgsss.scene.files.gltf.nodes import Stage
+from wgsss.scene.files.gltf.notes import Notes
+from wgsss.scene.files.gltf.primitive import Primitive, read_primitive
 from wgsss.scene.rig import turns
 
 Array = npt.NDArray[Any]

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_compression import decoded_primitive
-from wgsss.scene.files.gltf_document import SHAPES, Document, as_floats
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.compression import decoded_primitive
+from wgsss.scene.files.gltf.document import SHAPES, Document, as_floats
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.notes import Notes
 
 Array = npt.NDArray[Any]
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from wgsss.scene.files.contents import Look, Texture, Triple
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_extensions import HARMLESS
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_media import SCATTER, VOLUME, VOLUME_SCATTER, read_medium
-from wgsss.scene.files.gltf_notes import Notes
-from wgsss.scene.files.gltf_textures import Textures
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.extensions import HARMLESS
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.media import SCATTER, VOLUME, VOLUME_SCATTER, read_medium
+from wgsss.scene.files.gltf.notes import Notes
+from wgsss.scene.files.gltf.textures import Textures
 
 IOR, SPECULAR, DIFFUSE = "KHR_materials_ior", "KHR_materials_specular", "KHR_materials_diffuse_transmission"
 TRANSMISSION, GLOSSY = "KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness"

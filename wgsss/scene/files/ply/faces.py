@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.plydata import Lists, Table
+from wgsss.scene.files.ply.data import Lists, Table
 
 Array = npt.NDArray[Any]
 

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.scene.files.contents import CameraView, LightSource, Triple
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_nodes import Stage
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.nodes import Stage
+from wgsss.scene.files.gltf.notes import Notes
 
 Array = npt.NDArray[Any]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_fields import Item, plain
+from wgsss.scene.files.gltf.fields import Item, plain
 from wgsss.userfiles import require_file
 
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Look
 from wgsss.scene.files.locate import locate
-from wgsss.scene.files.mtl import read_materials
+from wgsss.scene.files.obj.mtl import read_materials
 from wgsss.scene.files.text import Text, shown, without_comment
 
 Array = npt.NDArray[Any]

@@ -20,8 +20,8 @@ from wgsss.errors import InputError
 from wgsss.scene.files.colors import linear, linear_colors
 from wgsss.scene.files.contents import Contents, Look, Part
 from wgsss.scene.files.corners import finite_normals, finite_uvs, picked, upside_down, vertices_of
-from wgsss.scene.files.objfaces import Faces, read_faces
-from wgsss.scene.files.objlooks import read_looks
+from wgsss.scene.files.obj.faces import Faces, read_faces
+from wgsss.scene.files.obj.looks import read_looks
 from wgsss.scene.files.text import Text, file_bytes, shown, without_comment
 from wgsss.scene.files.triangulate import triangulate
 

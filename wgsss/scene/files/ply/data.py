@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.plyheader import Element, Header
+from wgsss.scene.files.ply.header import Element, Header
 from wgsss.scene.files.text import Text, shown
 
 Array = npt.NDArray[Any]

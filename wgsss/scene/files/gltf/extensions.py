@@ -6,10 +6,10 @@ from collections import Counter
 from typing import Any
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_compression import DRACO, MESHOPT, PACKAGES, missing
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import plain, shown
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.compression import DRACO, MESHOPT, PACKAGES, missing
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import plain, shown
+from wgsss.scene.files.gltf.notes import Notes
 
 READ = {
     DRACO,

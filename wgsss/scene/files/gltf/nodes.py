@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item, as_whole, shown
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item, as_whole, shown
 from wgsss.scene.rig import Nodes, Pose
 
 Array = npt.NDArray[Any]

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from wgsss.scene.files.contents import Contents
-from wgsss.scene.files.gltf_animations import read_animations
-from wgsss.scene.files.gltf_container import damaged
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_extensions import check_required, note_unknown
-from wgsss.scene.files.gltf_nodes import read_nodes
-from wgsss.scene.files.gltf_notes import Notes
-from wgsss.scene.files.gltf_parts import read_parts
-from wgsss.scene.files.gltf_rig import read_rig
-from wgsss.scene.files.gltf_views import read_cameras, read_lights
+from wgsss.scene.files.gltf.animations import read_animations
+from wgsss.scene.files.gltf.container import damaged
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.extensions import check_required, note_unknown
+from wgsss.scene.files.gltf.nodes import read_nodes
+from wgsss.scene.files.gltf.notes import Notes
+from wgsss.scene.files.gltf.parts import read_parts
+from wgsss.scene.files.gltf.rig import read_rig
+from wgsss.scene.files.gltf.views import read_cameras, read_lights
 
 MM_PER_UNIT = 1000.0
 """its unit is the metre"""

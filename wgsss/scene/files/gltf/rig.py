@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import as_whole, plain
-from wgsss.scene.files.gltf_nodes import Stage
-from wgsss.scene.files.gltf_notes import Notes
-from wgsss.scene.files.gltf_parts import Placed
-from wgsss.scene.files.gltf_primitive import Primitive
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import as_whole, plain
+from wgsss.scene.files.gltf.nodes import Stage
+from wgsss.scene.files.gltf.notes import Notes
+from wgsss.scene.files.gltf.parts import Placed
+from wgsss.scene.files.gltf.primitive import Primitive
 from wgsss.scene.rig import Part, Rig, Skin
 
 Array = npt.NDArray[Any]

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene.files.gltf_fields import Item, plain
+from wgsss.scene.files.gltf.fields import Item, plain
 
 if TYPE_CHECKING:
-    from wgsss.scene.files.gltf_document import Document
+    from wgsss.scene.files.gltf.document import Document
 
 Array = npt.NDArray[Any]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Texture, Triple
-from wgsss.scene.files.gltf_container import data_of, file_of
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item, plain
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.container import data_of, file_of
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item, plain
+from wgsss.scene.files.gltf.notes import Notes
 
 TRANSFORM = "KHR_texture_transform"
 IMAGES = ("EXT_texture_webp", "EXT_texture_avif")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene.files.gltf_attributes import FAN, TRIANGLES, Attributes
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item, plain
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.attributes import FAN, TRIANGLES, Attributes
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item, plain
+from wgsss.scene.files.gltf.notes import Notes
 
 Array = npt.NDArray[Any]
 Rows = Callable[..., Array]

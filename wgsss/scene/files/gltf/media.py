@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.scene.files.contents import Medium
-from wgsss.scene.files.gltf_fields import Item
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.fields import Item
+from wgsss.scene.files.gltf.notes import Notes
 
 Array = npt.NDArray[Any]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Look, Texture, Triple
-from wgsss.scene.files.mtltexture import MapStatement
+from wgsss.scene.files.obj.mtl_texture import MapStatement
 from wgsss.scene.files.text import decoded, file_bytes, shown, without_comment
 
 # Statements that name an image and have no use here, beside all others that start with "map_".

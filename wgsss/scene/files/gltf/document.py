@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files import gltf_compression
-from wgsss.scene.files.gltf_container import data_of, file_of, read_container
-from wgsss.scene.files.gltf_fields import Item, as_whole, plain, shown
+from wgsss.scene.files.gltf import compression
+from wgsss.scene.files.gltf.container import data_of, file_of, read_container
+from wgsss.scene.files.gltf.fields import Item, as_whole, plain, shown
 
 Array = npt.NDArray[Any]
 
@@ -90,7 +90,7 @@ class Document:
         number = int(index)
         if number not in self._views:
             stride = item.whole("byteStride") if item.has("byteStride") else None
-            decoded = gltf_compression.decoded_view(self, item)
+            decoded = compression.decoded_view(self, item)
             self._views[number] = (self.span(item) if decoded is None else decoded, stride)
         return self._views[number]
 

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.scene.files.contents import NONE
-from wgsss.scene.files.gltf_container import damaged
-from wgsss.scene.files.gltf_document import Document
-from wgsss.scene.files.gltf_fields import Item, plain
-from wgsss.scene.files.gltf_notes import Notes
+from wgsss.scene.files.gltf.container import damaged
+from wgsss.scene.files.gltf.document import Document
+from wgsss.scene.files.gltf.fields import Item, plain
+from wgsss.scene.files.gltf.notes import Notes
 from wgsss.scene.keyframes import INTERPOLATIONS, PATHS, Channel
 from wgsss.scene.rig import Pose
 
