@@ -19,10 +19,10 @@ from wgsss.cli import bake, bench, catalogue, compare, export, info, profile, re
 from wgsss.cli.arguments import Parser
 from wgsss.cli.signals import Stopped, stoppable
 from wgsss.errors import InputError, Note, RenderError, unknown
-from wgsss.text import one_line
+from wgsss.text import one_line, shortened, shown
 
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as shells report them
-_LONGEST = 200  # characters of a library's message
+_LONGEST, _LONGEST_LINE = 200, 2000  # characters of a library's message, and of one of ours
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _unexpected(f"there is not enough memory for this ({one_line(error) or 'how much is not known'})")
     except Exception as error:
         return _unexpected(
-            f"a fault of wgsss, not of the input ({type(error).__name__}: {one_line(error)[:_LONGEST]}): please report"
+            f"a fault of wgsss, not of the input ({type(error).__name__}: {shortened(error, _LONGEST)}): please report"
             " it with the command and its files; WGSSS_DEBUG=1 shows where it happened"
         )
 
@@ -65,7 +65,7 @@ def _parse(argv: Sequence[str]) -> Any:
     if rest and rest[0].startswith("-"):
         raise unknown("option", rest[0].split("=")[0], commands.choices[args.command].options)
     if rest:
-        raise InputError(f"unexpected argument '{rest[0]}'")
+        raise InputError(f"unexpected argument {shown(rest[0])}")
     return args
 
 
@@ -93,7 +93,7 @@ def _told_warnings() -> Iterator[list[str]]:
 
 
 def _fail(message: object, code: int) -> int:
-    saying.aside(f"wgsss: error: {one_line(message)}")
+    saying.aside(f"wgsss: error: {shortened(message, _LONGEST_LINE)}")
     return code
 
 

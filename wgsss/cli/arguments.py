@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from wgsss import saying
 from wgsss.errors import InputError
-from wgsss.text import escaped, printable, span
+from wgsss.text import escaped, printable, shown, span
 
 if TYPE_CHECKING:
     from wgsss.methods import Method
@@ -118,7 +118,7 @@ def make_method(args: argparse.Namespace) -> Method:
     if parts == (None, None):
         return make_method(DEFAULT_METHOD if args.method is None else args.method, dict(args.knobs))
     if args.method is not None:
-        raise InputError(f"--method {args.method} has a surface and a translucency: name either it or those")
+        raise InputError(f"--method {shown(args.method)} has a surface and a translucency: name either it or those")
     return make_method("+".join("none" if part is None else part for part in parts), dict(args.knobs))
 
 
@@ -140,7 +140,7 @@ def size(text: str) -> tuple[int, int]:
 
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
-        raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT, such as 512x512")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not WIDTHxHEIGHT, such as 512x512")
     found = int(match[1]), int(match[2])
     if not all(1 <= side <= MAX_SIDE for side in found):
         raise argparse.ArgumentTypeError(f"the image size must be 1 to {MAX_SIDE} pixels a side, not {text}")
@@ -150,7 +150,7 @@ def size(text: str) -> tuple[int, int]:
 def count(text: str, most: int = 999_999_999) -> int:
     """A whole number from 1 to `most`."""
     if not re.fullmatch(r"[0-9]{1,9}", text) or not 1 <= int(text) <= most:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 to {most}")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a whole number from 1 to {most}")
     return int(text)
 
 
@@ -186,14 +186,14 @@ def _within(text: str, low: float, high: float, unit: str = "") -> float:
         value = math.nan
     if not low <= value <= high:
         wanted = "a number" if (low, high) == (-1e300, 1e300) else f"a number {span(low, high, unit=unit)}"
-        raise argparse.ArgumentTypeError(f"'{text}' is not {wanted}")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not {wanted}")
     return value
 
 
 def output(text: str) -> Path:
     """The path of a file or folder to write."""
     if not text.strip() or "\0" in text:
-        raise argparse.ArgumentTypeError(f"{text!r} is not the name of a file or folder")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not the name of a file or folder")
     return Path(text)
 
 
@@ -201,7 +201,7 @@ def assignment(text: str) -> tuple[str, str]:
     """KNOB=VALUE."""
     name, equals, value = text.partition("=")
     if not (name and equals and value):
-        raise argparse.ArgumentTypeError(f"'{text}' is not KNOB=VALUE, such as map_size=512")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not KNOB=VALUE, such as map_size=512")
     return name, value
 
 
@@ -212,7 +212,9 @@ def table_of(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError):  # of the grammar, a number too long, nested too deep
         found = None
     if not isinstance(found, dict):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a table such as {{kind = \"orthographic\", height = 200}}")
+        raise argparse.ArgumentTypeError(
+            f'{shown(text)} is not a table such as {{kind = "orthographic", height = 200}}'
+        )
     return found
 
 
@@ -234,5 +236,5 @@ def names(text: str) -> list[str]:
     """NAME,NAME,…, each once."""
     found = [name.strip() for name in text.split(",")]
     if not all(found):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list of names such as lambert,deon07")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a list of names such as lambert,deon07")
     return list(dict.fromkeys(found))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from wgsss import saying
 from wgsss.cli import arguments
-from wgsss.text import one_line
+from wgsss.text import one_line, shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -81,7 +81,7 @@ def radii(text: str) -> list[float]:
     """Distances in mm, with commas between them."""
     values = [arguments.number(part) for part in text.split(",")]
     if not 0 <= min(values) <= max(values) <= 1e12:
-        raise argparse.ArgumentTypeError(f"'{text}' has a distance that is not from 0 to 1e12 (mm)")
+        raise argparse.ArgumentTypeError(f"{shown(text)} has a distance that is not from 0 to 1e12 (mm)")
     return values
 
 
