@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wgsss.errors import InputError, RenderError
+    from wgsss.errors import InputError, Note, RenderError
     from wgsss.methods import METHODS
     from wgsss.output import save
     from wgsss.rendering import AOVS, Image, Renderer, render
@@ -52,6 +52,7 @@ __all__ = [
     "Maps",
     "Material",
     "Mesh",
+    "Note",
     "Object",
     "OrthographicCamera",
     "PerspectiveCamera",
@@ -70,7 +71,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "wgsss.errors": {"InputError", "RenderError"},
+    "wgsss.errors": {"InputError", "Note", "RenderError"},
     "wgsss.methods": {"METHODS"},
     "wgsss.output": {"save"},
     "wgsss.rendering": {"AOVS", "Image", "Renderer", "render"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,3 +109,22 @@ def test_a_camera_that_cannot_be_is_refused(kind: type, fields: dict, message: s
 def test_a_projection_that_cannot_be_is_refused(aspect: float, near: float, far: float) -> None:
     with pytest.raises(InputError, match="no projection"):
         PerspectiveCamera((0, 0, 1), (0, 0, 0)).projection(aspect, near, far)
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"target": (0, 0)}, r"target must be three numbers, each from .* \(mm\), not \(0, 0\)"),
+        ({"distance": 0.0}, r"distance must be from 1e-06 to 1e\+15 \(mm\), not 0.0"),
+        ({"distance": 10**400}, "distance must be from"),
+        ({"azimuth": math.inf}, r"azimuth must be from .* \(degrees\), not inf"),
+        ({"elevation": 90.0}, r"elevation must be from -89.999 to 89.999 \(degrees\), not 90.0"),
+        ({"elevation": "high"}, "elevation must be from .*, not 'high'"),
+    ],
+)
+def test_an_orbit_names_its_own_values(changed: dict[str, Any], says: str) -> None:
+    orbit: dict[str, Any] = {"target": (0, 0, 0), "distance": 100.0, "azimuth": 20.0, "elevation": 10.0}
+    for kind in (PerspectiveCamera, OrthographicCamera):
+        kind.orbit(**orbit)
+        with pytest.raises(InputError, match=f"^{says}"):
+            kind.orbit(**{**orbit, **changed})

@@ -28,7 +28,8 @@ from wgsss.study.compare import Comparison, compare
 from wgsss.study.report import OWN, check_folder, page, write_report
 
 SIZE = (48, 32)
-NAME = "</script><b>&amp;"  # whatever a file calls its scene, the page shows it and runs none of it
+# Whatever a file calls its scene, the page and the sheet show it and run none of it.
+NAME = "$\\frac{_ <!--<script></script><b>&amp;\u2028]]>"
 
 
 @pytest.fixture(scope="module")

@@ -134,7 +134,13 @@ class Paths:
         command = [sys.executable, "-P", str(mitsuba_render.__file__), self._variant]
         with (self._folder / "errors").open("w") as errors:
             self._process = subprocess.Popen(
-                command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True
+                command,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                start_new_session=True,  # so that signals from the terminal reach only us
             )
         return self._process
 

@@ -112,6 +112,8 @@ def _knobs(key: str, value: Any) -> None:
 def _error(key: str, value: Any) -> None:
     checks = {"rel_rmse": _number_or_null, "psnr": _signed_or_null, "flip": _number_or_null, "bias": _signed_or_null}
     _members(value, checks, f"{key}.")
+    if "flip_reason" in value:
+        _text(f"{key}.flip_reason", value["flip_reason"])
 
 
 def _is_number(value: Any, low: float) -> bool:

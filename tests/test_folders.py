@@ -1,0 +1,83 @@
+"""Folders to write to: whole or not at all, and gone again where nothing came of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from wgsss.errors import InputError
+from wgsss.folders import appearing, made
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_files_appear_at_once_beside_what_is_there(tmp_path: Path, there: bool) -> None:
+    folder = tmp_path / "out"
+    if there:
+        folder.mkdir()
+        (folder / "old").write_text("old")
+        (folder / "a").write_text("old")
+    with appearing(folder) as place:
+        for name in "ab":
+            (place / name).write_text("new")
+        assert not (folder / "b").exists()
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {
+        **({"old": "old"} if there else {}),
+        **{"a": "new", "b": "new"},
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, InputError])
+@pytest.mark.parametrize("there", [False, True])
+def test_what_fails_leaves_nothing(tmp_path: Path, error: type[BaseException], there: bool) -> None:
+    folder = tmp_path / "out"
+    if there:
+        folder.mkdir()
+    with pytest.raises(error), appearing(folder) as place:
+        (place / "a").write_text("new")
+        raise error
+    assert list(tmp_path.iterdir()) == ([folder] if there else []) and not list(folder.glob("*"))
+
+
+def test_a_folder_in_the_place_of_a_file_keeps_all_others_away(tmp_path: Path) -> None:
+    (tmp_path / "out" / "b").mkdir(parents=True)
+    with pytest.raises(InputError, match="b: this is a folder, in the place of a file"):
+        with appearing(tmp_path / "out") as place:
+            for name in "abc":
+                (place / name).write_text("new")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["b"]
+
+
+BAD: dict[str, tuple[Callable[[Path], object], str]] = {
+    "file": (lambda path: path.touch(), "this is not a folder"),
+    "fifo": (os.mkfifo, "this is not a folder"),
+    "device": (lambda path: path.symlink_to("/dev/null"), "this is not a folder"),
+    "loop": (lambda path: path.symlink_to(path), "is not the name of a folder|cannot be written"),
+    "x" * 300: (lambda path: None, "cannot be written .File name too long"),
+    "a\0b": (lambda path: None, "is not the name of a folder"),
+}
+
+
+@pytest.mark.parametrize("name", BAD, ids=[name[:6].replace("\0", "NUL") for name in BAD])
+@pytest.mark.parametrize("make", [appearing, made])
+def test_what_is_no_folder_is_told_before_the_block(tmp_path: Path, name: str, make: Callable[[Path], object]) -> None:
+    prepare, says = BAD[name]
+    prepare(tmp_path / name)
+    before = list(tmp_path.iterdir())
+    with pytest.raises(InputError, match=says):
+        with make(tmp_path / name):  # type: ignore[attr-defined]
+            raise AssertionError("the block ran")
+    assert list(tmp_path.iterdir()) == before
+
+
+def test_folders_made_for_nothing_go_again_and_others_stay(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    with made(tmp_path / "a" / "b" / "c"):
+        assert (tmp_path / "a" / "b" / "c").is_dir()
+    assert list((tmp_path / "a").iterdir()) == []
+    with made(tmp_path / "a" / "b" / "c"):
+        (tmp_path / "a" / "b" / "kept").touch()
+    assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["kept"]
