@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.images.colour import REC709, from_primaries, from_xyz, luminance_weights, transformed
-from wgsss.scene.images.files import MAX_SIDE, check_size
+from wgsss.scene.images.files import MAX_SIDE, MAX_SKY_SIDE, check_size
 
 Array = npt.NDArray[Any]
 
@@ -51,7 +51,7 @@ class _Part:
         """Raise InputError for sizes that cannot be used."""
         for name in ("displayWindow", "dataWindow"):
             left, top, right, bottom = self.window(name)
-            check_size(right - left, bottom - top)
+            check_size(right - left, bottom - top, MAX_SKY_SIDE)
         tiles = self.header.get("tiles")
         if tiles is not None and max(tiles.xSize, tiles.ySize) > MAX_SIDE:
             raise InputError(f"its tiles have {tiles.xSize} x {tiles.ySize} pixels; at most {MAX_SIDE} are possible")

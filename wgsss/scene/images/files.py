@@ -6,11 +6,13 @@ from wgsss.errors import InputError
 
 MAX_SIDE = 8192
 """texels: the longest side of a texture that every WebGPU device has"""
+MAX_SKY_SIDE = 16384
+"""pixels: the longest side of a sky, which is averaged before it becomes a texture"""
 
 
-def check_size(width: int, height: int) -> None:
-    """Raise InputError for an image without pixels, or with more than MAX_SIDE on a side."""
+def check_size(width: int, height: int, most: int = MAX_SIDE) -> None:
+    """Raise InputError for an image without pixels, or with more than `most` on a side."""
     if width < 1 or height < 1:
         raise InputError("the image is empty")
-    if max(width, height) > MAX_SIDE:
-        raise InputError(f"the image has {width} x {height} pixels; at most {MAX_SIDE} on a side are possible")
+    if max(width, height) > most:
+        raise InputError(f"the image has {width} x {height} pixels; at most {most} on a side are possible")

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
 from wgsss.scene.images.colour import EQUAL_ENERGY, from_primaries, from_xyz, transformed
-from wgsss.scene.images.files import check_size
+from wgsss.scene.images.files import MAX_SKY_SIDE, check_size
 from wgsss.scene.images.runs import decoded
 
 Array = npt.NDArray[Any]
@@ -99,7 +99,7 @@ def _header(head: bytes, path: Path) -> Header:
     if size is None or size[2] == size[5]:
         raise InputError(f"damaged: its size should come next, not '{_text(head[at : end if end >= 0 else None])}'")
     shape = int(size[3]), int(size[6])
-    check_size(*(shape[::-1] if size[2] == b"Y" else shape))
+    check_size(*(shape[::-1] if size[2] == b"Y" else shape), MAX_SKY_SIDE)
     if xyz:
         matrix: Array | None = from_xyz(EQUAL_ENERGY) / _WHITE_EFFICACY
     else:
