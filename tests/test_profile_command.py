@@ -108,7 +108,7 @@ def test_plot(tmp_path: Path, capsys):
         (["skin1", "--r", "0"], "'burley' is infinite at r = 0 mm"),
         (["skin1", "--thickness", "0"], r"'0' is not a number from 1e-06 to 1e\+13 \(mm\)"),
         (["skin1", "--thickness", "1"], "'skin1' by the model 'multipole': .*red.*1.295"),
-        (["skin", "--thickness", "1"], "'skin': a thickness is for"),
+        (["skin", "--thickness", "1"], "'skin': a thickness needs"),
         (["skin", "--photons", "10"], "'skin' by the model '.*': the material has no sigma_a and sigma_s_prime"),
         (["skin1", "--photons", "0"], "'0' is not a whole number"),
         (["skin1", "--csv", "--json"], "one of them"),

@@ -89,7 +89,7 @@ def test_photons_are_one_of_the_models():
     ("case", "models", "says"),
     [
         (Case(SKIN1), ["dipol"], "unknown model 'dipol'; did you mean 'dipole'"),
-        (Case(SKIN1), ["multipole"], "'skin1' by the model 'multipole': a thickness is needed"),
+        (Case(SKIN1), ["multipole"], "'skin1' by the model 'multipole': it needs a thickness \\(--thickness MM\\)"),
         (Case(SKIN1), ["table"], "'skin1' by the model 'table': the material has no table"),
         (
             Case(MATERIALS["skin"]),
@@ -117,7 +117,7 @@ def test_what_a_model_cannot_serve_is_told(case, models, says):
 
 def test_a_thickness_is_for_coefficients():
     for material in (LAYERED, MATERIALS["skin"], ONE_TABLE):
-        with pytest.raises(InputError, match=f"'{material.name}': a thickness is for"):
+        with pytest.raises(InputError, match=f"'{material.name}': a thickness needs"):
             Case(material, thickness=3.0)
 
 

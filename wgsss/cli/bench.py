@@ -63,7 +63,9 @@ def run(args: Any) -> None:
         )
     else:
         if arguments.has_scene_choices(args):
-            raise InputError("without a scene there is nothing to measure: no --material and the like")
+            raise InputError(
+                "without a scene there is nothing to measure: --material and the like do not apply"
+            )
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
     arguments.tell(
@@ -77,9 +79,11 @@ def _speedup(args: Any) -> None:
     if args.scenes != ["crowd"]:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
     if arguments.has_scene_choices(args):
-        raise InputError("the table speedup is of the scene crowd as it is: no --material and the like")
+        raise InputError(
+            "the table speedup is of the scene crowd as it is: --material and the like do not apply"
+        )
     if args.methods is not None or args.scheduler is not None:
-        raise InputError("the table speedup is of two methods, measured here: no --methods and no --scheduler")
+        raise InputError("the table speedup is of two methods, measured here: --methods and --scheduler do not apply")
     table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)
     about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"
     lines = [arguments.table(table.rows()), "", f"{about}, maps of {table.map_size}, {table.adapter}"]

@@ -49,7 +49,7 @@ def run(args: Any) -> None:
     from wgsss.study import profiles
 
     if args.csv and args.json:
-        raise InputError("--csv or --json, one of them")
+        raise InputError("--csv and --json exclude each other: give one of them")
     output = args.output and check_output(args.output, (".png", ".svg"))
     material = load_material(args.material)
     case = profiles.Case(material, args.thickness, args.k, args.photons or profiles.PHOTONS)

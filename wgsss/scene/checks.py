@@ -86,6 +86,12 @@ def image_size(size: tuple[int, int]) -> None:
         raise InputError(f"the image size must be 1 to {MAX_SIDE} pixels a side, not {sides}")
 
 
+def time(time_s: float) -> None:
+    """Check a time, in seconds."""
+    if not is_number(time_s) or abs(time_s) > SECONDS:
+        raise InputError(f"the time must be {span(-SECONDS, SECONDS, unit='seconds')}, not {shown(time_s)}")
+
+
 def not_parallel(first: Iterable[float], second: Iterable[float], message: str) -> None:
     """Raise `message` where two vectors, given as triples, do not span a plane."""
     (a, b, c), (x, y, z) = first, second

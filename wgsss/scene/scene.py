@@ -140,5 +140,9 @@ class Scene:
         )
 
     def at(self, time_s: float) -> Scene:
-        """The scene as it is at a time in seconds: a still, in which nothing moves or turns."""
+        """The scene as it is at a time in seconds: a still, in which nothing moves or turns.
+
+        Raises InputError for times beyond 1e9 s either way.
+        """
+        checks.time(time_s)
         return replace(self, objects=tuple(o.at(time_s) for o in self.objects), camera=self.camera.at(time_s))

@@ -45,7 +45,7 @@ class Case:
 
     def __post_init__(self) -> None:
         if self.thickness is not None and self.material.sigma_a is None:
-            raise InputError(f"material '{self.material.name}': a thickness is for sigma_a and sigma_s_prime")
+            raise InputError(f"material '{self.material.name}': a thickness needs one with sigma_a and sigma_s_prime")
 
     @cached_property
     def stack(self) -> tuple[Layer, ...]:
@@ -74,7 +74,7 @@ class Case:
 
 def _multipole(case: Case) -> Profile:
     if case.thickness is None:
-        raise InputError("a thickness is needed")
+        raise InputError("it needs a thickness (--thickness MM)")
     return Multipole(case.medium.sigma_a, case.medium.sigma_s_prime, case.medium.eta, thickness=case.thickness)
 
 
