@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections import defaultdict
 from contextlib import suppress
@@ -42,6 +43,20 @@ LIMITS = {
     "min-uniform-buffer-offset-alignment": 256,
     "min-storage-buffer-offset-alignment": 256,
 }
+
+# The graphics interfaces that are asked for adapters: wgpu's names of them, and those that adapters give.
+BACKENDS = {
+    "darwin": {"Metal": "Metal"},
+    "win32": {"Vulkan": "Vulkan", "DX12": "D3D12"},
+}.get(sys.platform, {"Vulkan": "Vulkan"})
+INSTALL = {
+    "darwin": "no Metal adapter found: wgsss needs a Mac whose graphics processor has Metal",
+    "win32": "no Vulkan or Direct3D 12 adapter found: install the graphics driver of the card's maker",
+}.get(
+    sys.platform,
+    "no Vulkan adapter found: install the GPU's driver, or Mesa's software driver (on Debian and Ubuntu the packages "
+    "mesa-vulkan-drivers and libvulkan1)",
+)
 
 FORMATS: dict[str, tuple[str, int]] = {  # texture format -> numpy scalar, channels
     "r32float": ("<f4", 1),
@@ -90,7 +105,7 @@ def texel_bytes(texture_format: str) -> int:
 
 
 def adapters() -> list[Any]:
-    """The Vulkan adapters of this machine."""
+    """The adapters of this machine, of those BACKENDS that the system has: Vulkan, on Macs Metal."""
     import wgpu
 
     _prepare_wgpu()
@@ -98,7 +113,7 @@ def adapters() -> list[Any]:
     return [
         a
         for a in wgpu.gpu.enumerate_adapters_sync()
-        if wanted in a.info["device"] and a.info["backend_type"] == "Vulkan"
+        if wanted in a.info["device"] and a.info["backend_type"] in BACKENDS.values()
     ]
 
 
@@ -108,7 +123,7 @@ def _prepare_wgpu() -> None:
     from cffi import CDefError
     from wgpu.backends.wgpu_native import extras, ffi
 
-    extras.set_instance_extras(backends=["Vulkan"])  # others are never used, and slow to ask
+    extras.set_instance_extras(backends=list(BACKENDS))  # others are never used, and slow to ask
     # Its calls have the C types that they need parsed one by one, 15 ms each and a second in all, since each time all
     # names are declared anew. Parsed in one go they take as long as three. Without these internals it is only slower.
     with suppress(AttributeError, CDefError):
@@ -134,15 +149,13 @@ class TextureKey:
 class Gpu:
     """A device with its pipelines, samplers and pool of textures.
 
-    Raises InputError where there is no Vulkan adapter.
+    Raises InputError where there is no adapter.
     """
 
     def __init__(self) -> None:
         found = adapters()
         if not found:
-            raise InputError(
-                "no Vulkan adapter found: install a GPU driver, or Mesa's software driver (mesa-vulkan-drivers)"
-            )
+            raise InputError(INSTALL)
         found.sort(
             key=lambda a: ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown").index(a.info["adapter_type"])
         )
