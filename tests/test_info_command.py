@@ -55,7 +55,7 @@ def test_a_mesh(tmp_path: Path, info: Any) -> None:
     assert head["unit"] == "metre, as the format says (--size-mm X makes the longest side X mm)"
     assert (body["body"], body["faces"], body["vertices"], body["surface"]) == ("ball", "476", "240", "closed")
     assert (body["material"], body["light-spreads"]) == ("marble", f"{MARBLE_MM} mm")
-    assert body["wears"] == "base colour texture 64 x 64"
+    assert body["has"] == "base colour texture 64 x 64"
     assert text.rstrip().endswith("notes  all that it holds is used")
 
 
@@ -86,7 +86,7 @@ def test_all_that_a_mesh_file_can_hold(tmp_path: Path, info: Any) -> None:
     assert head["lights"] == "1 point, 2 directional (--file-lights uses them)"
     assert head["cameras"] == "1 perspective (--file-camera uses the first)"
     assert head["animations"] == "Walk (plays), Run (--animation NAME plays another, or none)"
-    assert [body["wears"] for body in bodies] == ["base colour texture 64 x 64, a motion", "base colour 1 0.25 0"]
+    assert [body["has"] for body in bodies] == ["base colour texture 64 x 64, a motion", "base colour 1 0.25 0"]
     notes = [line.removeprefix("notes").strip() for line in text.rstrip().split("\n\n")[2].splitlines()]
     assert notes == [
         "plays Walk, the first of 2 animations (--animation NAME plays another: Run)",
@@ -107,7 +107,7 @@ def test_what_is_repaired_and_what_is_missing(tmp_path: Path, info: Any) -> None
     accessor["count"] -= 3
     text = info(file.save(tmp_path / "ball.gltf"))
     assert table_of(text)[0]["surface"] == "open" and "3 boundary edges (1 hole)" in text
-    assert "gone.png" in text and table_of(text)[0]["wears"] == ""
+    assert "gone.png" in text and table_of(text)[0]["has"] == ""
 
 
 def test_of_very_many_bodies_the_first_are_listed(tmp_path: Path, info: Any) -> None:

@@ -63,9 +63,7 @@ def run(args: Any) -> None:
         )
     else:
         if arguments.has_scene_choices(args):
-            raise InputError(
-                "without a scene there is nothing to measure: --material and the like do not apply"
-            )
+            raise InputError("without a scene there is nothing to measure: --material and the like do not apply")
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
     arguments.tell(
@@ -79,9 +77,7 @@ def _speedup(args: Any) -> None:
     if args.scenes != ["crowd"]:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
     if arguments.has_scene_choices(args):
-        raise InputError(
-            "the table speedup is of the scene crowd as it is: --material and the like do not apply"
-        )
+        raise InputError("the table speedup is of the scene crowd as it is: --material and the like do not apply")
     if args.methods is not None or args.scheduler is not None:
         raise InputError("the table speedup is of two methods, measured here: --methods and --scheduler do not apply")
     table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)

@@ -12,7 +12,7 @@ MOST_BODIES = 40
 """that are listed; JSON has all"""
 
 _SLOTS = {"base_color": "base colour", "normal": "normal", "specular": "specular"}
-_HEAD = ["body", "faces", "vertices", "size, mm", "surface", "material", "light spreads", "wears"]
+_HEAD = ["body", "faces", "vertices", "size, mm", "surface", "material", "light spreads", "has"]
 
 
 def text_of(found: dict[str, Any]) -> str:

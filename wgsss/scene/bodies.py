@@ -17,7 +17,6 @@ from wgsss.errors import InputError, Note
 from wgsss.scene.animation import Animation, choose_clip, first_of_equal, unfolded
 from wgsss.scene.blend import Blend
 from wgsss.scene.checks import Triple
-from wgsss.scene.dressing import Wardrobe, coordinates, lead, shared, wearable
 from wgsss.scene.files import read_file
 from wgsss.scene.files.contents import CameraView, LightSource, Look
 from wgsss.scene.material import Maps
@@ -28,6 +27,7 @@ from wgsss.scene.rig import Rig
 from wgsss.scene.simplify import simplified
 from wgsss.scene.soup import Soup, joined, placed
 from wgsss.scene.surface import device_vertices, surface
+from wgsss.scene.textures import TextureReader, coordinates, first_texture, shared, usable_look
 
 Array = npt.NDArray[Any]
 
@@ -72,7 +72,7 @@ def load_mesh(
     Where its materials differ, only what they share is kept; a warning says what is not.
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
-    looks = [wearable(part, file.say) for part in file.contents.parts]
+    looks = [usable_look(part, file.say) for part in file.contents.parts]
     return file.bodies([(shared(looks, file.say), list(range(len(looks))))])[0]
 
 
@@ -101,7 +101,7 @@ def load_file(
     not fit it, and for a scale that is not positive.
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
-    looks = [wearable(part, file.say) for part in file.contents.parts]
+    looks = [usable_look(part, file.say) for part in file.contents.parts]
     alike: dict[Any, list[int]] = {}
     for number, (part, look) in enumerate(zip(file.contents.parts, looks, strict=True)):
         alike.setdefault((replace(look, name=""), coordinates(part, look) is None), []).append(number)
@@ -140,7 +140,7 @@ class _File:
             self._placed = unfolded(self._placed, self._clip)
         self._boxes = boxes(self.contents.parts, self._placed)
         self.scale = scale(path, self._boxes, mm_per_unit or self.contents.mm_per_unit, size_mm)
-        self._wardrobe = Wardrobe(self.say)
+        self._textures = TextureReader(self.say)
         for note in self.contents.notes:
             self.say(note)
 
@@ -156,12 +156,12 @@ class _File:
         return [np.asarray(numbers)[label == one].tolist() for one in np.unique(label)]
 
     def bodies(self, groups: Sequence[tuple[Look, list[int]]]) -> tuple[LoadedMesh, ...]:
-        """A body for each look and the numbers of the parts that wear it."""
+        """A body for each look and the numbers of the parts that have it."""
         found, why = [], "all faces are degenerate"
         for look, numbers in groups:
             name = look.name if len(groups) > 1 else ""
             soup, rig = self._soup(look, numbers)
-            mask = self._wardrobe.mask(look)
+            mask = self._textures.mask(look)
             if mask is not None:
                 soup = soup.cut(mask)
             if not len(soup.faces):
@@ -194,14 +194,14 @@ class _File:
         return self.contents.splits or len(parts) > 1 or any(part.uvs or part.normals is not None for part in parts)
 
     def _body(self, look: Look, name: str, soup: Soup, rig: Rig | None, splits: bool) -> LoadedMesh | None:
-        """A soup as a mesh with all that it wears; None where no face has an area, or nothing a size."""
+        """A soup as a mesh with its textures and its motion; None where no face has an area, or nothing a size."""
         centre, positions = centred(soup.positions * self.scale, soup.faces)
         faces, notes = soup.faces, []
         clip = None if self._clip is None or rig is None else self._clip.of(rig)
         if self.simplify is not None and len(faces) > self.simplify:
             positions, faces = simplified(positions, faces, self.simplify)
             lost = {
-                "textures": soup.uvs is not None and lead(look) is not None,
+                "textures": soup.uvs is not None and first_texture(look) is not None,
                 "texture coordinates": soup.uvs is not None,
                 "normals": soup.normals is not None,
                 "vertex colours": soup.colors is not None,
@@ -228,7 +228,7 @@ class _File:
             sources, first = fixed.sources(faces), first_of_equal(clip.rig)
             where = Blend.same(sources) if soup.sources is None else soup.sources.at(sources)
             motion = Animation(clip, Blend(first[where.index], where.weight), self.scale, centre)
-        maps = self._wardrobe.maps(look)
+        maps = self._textures.maps(look)
         if mesh.corner_uvs is None:
             maps = replace(maps, base_color=None, normal=None, specular=None)
         return LoadedMesh(mesh, maps, motion, look, self.scale, tuple(centre.tolist()))

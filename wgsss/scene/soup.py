@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from wgsss.scene.blend import Blend
 from wgsss.scene.cutout import Mask, cut
-from wgsss.scene.dressing import FARTHEST_UV, coordinates
 from wgsss.scene.files.contents import Look, Part
 from wgsss.scene.repair import counted
 from wgsss.scene.rig import Rig
+from wgsss.scene.textures import FARTHEST_UV, coordinates
 
 Array = npt.NDArray[Any]
 
@@ -61,7 +61,7 @@ def placed(parts: Sequence[Part], rig: Rig | None) -> list[Array]:
 def joined(
     parts: Sequence[Part], positions: Sequence[Array], look: Look, rig: Rig | None, say: Callable[[str], None]
 ) -> Soup:
-    """Parts that wear one look, as one. `positions` are theirs, placed; `rig` is of these parts alone."""
+    """Parts of one look, joined. `positions` are theirs, placed; `rig` is of these parts alone."""
     faces, normals, start = [], [], 0
     for number, part in enumerate(parts):
         shaped = rig is not None and rig.parts[number].is_shaped(rig.nodes.rest)

@@ -24,7 +24,7 @@ _MAX_ETA = 3.0
 
 
 class Looks:
-    """The materials of a document, each read once, when a primitive first wears it."""
+    """The materials of a document, each read once, when a primitive first has it."""
 
     def __init__(self, document: Document, notes: Notes) -> None:
         self._document, self._notes = document, notes
@@ -32,7 +32,7 @@ class Looks:
         self._looks: dict[int | None, Look] = {None: Look()}
 
     def of(self, primitive: Item, sets: Any) -> Look:
-        """What a primitive wears, without textures over sets of coordinates that it does not have, which is noted."""
+        """The look of a primitive, without textures over sets of coordinates that it does not have, which is noted."""
         number = self._document.link(primitive, "material", "material")
         if number is not None and number not in self._looks:
             self._looks[number] = self._read(self._document.all("material")[number])

@@ -1,4 +1,4 @@
-"""From what a file says that a surface looks like to the textures that it wears."""
+"""The textures of a mesh file: which of them a part can have, where they lie on it, and their pixels."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ _SQUARED = 256
 _ROUNDING = 1e-4  # of texture coordinates at the border of the image
 
 
-def lead(look: Look) -> Texture | None:
+def first_texture(look: Look) -> Texture | None:
     """The texture whose place on the surface all textures of the look share."""
     return next((texture for slot in SLOTS if (texture := _texture(look, slot)) is not None), None)
 
 
-def wearable(part: Part, say: Say) -> Look:
-    """The part's look, less the textures that it cannot wear: those without texture coordinates, and those that lie
-    over other coordinates than the first."""
-    look, first = part.look, lead(part.look)
+def usable_look(part: Part, say: Say) -> Look:
+    """The part's look, without textures that it cannot have: all, where it has no texture coordinates, and those
+    that lie over other coordinates than the first."""
+    look, first = part.look, first_texture(part.look)
     if first is None:
         return look
     if first.coordinates not in part.uvs:
@@ -80,7 +80,7 @@ def shared(looks: list[Look], say: Say) -> Look:
 
 def coordinates(part: Part, look: Look) -> Array | None:
     """float64 (V, 2): where the look's textures are on the part, v down; None without texture coordinates."""
-    first = lead(look)
+    first = first_texture(look)
     uvs = part.uvs.get(first.coordinates if first else 0)
     if uvs is None or first is None or first.transform is None:
         return uvs
@@ -89,7 +89,7 @@ def coordinates(part: Part, look: Look) -> Array | None:
         return np.stack([uvs[:, 0] * row[0] + uvs[:, 1] * row[1] + row[2] for row in matrix], axis=1)
 
 
-class Wardrobe:
+class TextureReader:
     """Decodes the textures of a file, each once."""
 
     def __init__(self, say: Say) -> None:
@@ -100,7 +100,7 @@ class Wardrobe:
         """The look's textures. One that is damaged, or larger than a texture can be, is left out and said."""
         base_color, normal, specular = (self._image(_texture(look, slot), slot) for slot in SLOTS)
         found = Maps(base_color, normal, specular)
-        first = lead(look)
+        first = first_texture(look)
         if first is not None:
             found = replace(found, wrap=first.wrap, nearest=first.nearest)
         scale = min(max(look.normal_scale, -STEEPEST), STEEPEST)
