@@ -143,7 +143,10 @@ def test_uniform_light_stays_uniform(gpu, mesh, monkeypatch):
     monkeypatch.setattr("wgsss.stage.sky_visibility", lambda scene, lights, positions, normals: np.ones(len(positions)))
     M, _, charts = diffused_map(gpu, lit(EnvironmentLight((1, 1, 1)), mesh=mesh, material=SKIN), monkeypatch)
     used = gpu.read_texture(charts.ids)[..., 0] > 0
-    np.testing.assert_allclose(M[used], np.pi * SKIN_GAUSSIANS.total[None].repeat(used.sum(), 0), rtol=4e-3)
+    lost = used & ~M.any(axis=2)  # texels without a value at a chart's corner, which are left out when the map is read
+    assert lost.sum() < 1e-5 * used.sum()
+    found = M[used & ~lost]
+    np.testing.assert_allclose(found, np.broadcast_to(np.pi * SKIN_GAUSSIANS.total, found.shape), rtol=4e-3)
 
 
 def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
