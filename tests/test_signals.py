@@ -121,3 +121,24 @@ def test_a_signal_that_was_ignored_before_stays_so(tmp_path: Path) -> None:
     wait_for(running, tmp_path, "a.0001.png")
     running.send_signal(signal.SIGHUP)
     assert running.wait(timeout=60) == 0 and len(list(tmp_path.glob("a.*.png"))) == 40
+
+
+CHANGED = """
+import time
+from wgsss.cli import catalogue
+def slow(args):
+    open("working", "w").close()
+    try:
+        time.sleep(60)
+    except BaseException:
+        raise ImportError("initialization failed") from None
+catalogue.scenes = slow
+"""
+
+
+def test_a_signal_of_which_a_library_makes_another_exception_is_one_all_the_same(tmp_path: Path) -> None:
+    running = start(tmp_path, "scenes", code=CHANGED)
+    wait_for(running, tmp_path, "working")
+    running.send_signal(signal.SIGTERM)
+    assert running.communicate(timeout=20) == ("", "")
+    assert running.returncode == 143

@@ -30,7 +30,7 @@ def run(folder: Path, *argv: str | bytes, shell: str = "", **environment: str) -
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, timeout=60)
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8", "ascii:strict", "utf-16"])
+@pytest.mark.parametrize("encoding", ["ascii:strict", "latin-1", "utf-16"])
 def test_names_in_any_alphabet_are_printed_in_any_encoding(tmp_path: Path, encoding: str) -> None:
     where = {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
     text, as_json = run(tmp_path, *RENDER, **where), run(tmp_path, *RENDER, "--json", **where)
@@ -65,8 +65,8 @@ def test_what_would_steer_a_terminal_or_break_a_line_is_escaped(tmp_path: Path) 
     assert failed.returncode == 2 and failed.stderr == b"wgsss: error: no \\x1b\\x07where.toml: no such file\n"
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
-@pytest.mark.parametrize("argv", [RENDER, ["methods"], ["--help"], ["render", "nowhere"]])
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("argv", [RENDER, ["--help"], ["render", "nowhere"]])
 def test_closed_streams_take_nothing(tmp_path: Path, closed: str, argv: list[str]) -> None:
     done = run(tmp_path, *argv, shell=closed)
     assert done.returncode == (2 if argv[-1] == "nowhere" else 0)
@@ -76,7 +76,7 @@ def test_closed_streams_take_nothing(tmp_path: Path, closed: str, argv: list[str
 
 
 @full
-@pytest.mark.parametrize("argv", [["methods"], ["--help"], ["--version"], ["render", "--help"], ["scenes", "--json"]])
+@pytest.mark.parametrize("argv", [["methods"], ["render", "--help"], ["--version"]])
 def test_a_full_device_is_told_in_one_line(tmp_path: Path, argv: list[str]) -> None:
     done = run(tmp_path, *argv, shell=">/dev/full")
     assert done.returncode == 2
@@ -93,7 +93,7 @@ def test_where_errors_cannot_be_written_the_exit_code_stands(tmp_path: Path) -> 
     assert run(tmp_path, *RENDER, shell="2>/dev/full").returncode == 0
 
 
-@pytest.mark.parametrize("argv", [["methods"], ["--help"], ["--version"], ["materials", "--json"]])
+@pytest.mark.parametrize("argv", [["--help"], ["materials", "--json"]])
 def test_a_reader_that_has_gone_ends_the_command_quietly(tmp_path: Path, argv: list[str]) -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -71,7 +71,8 @@ def cached(
     try:
         _write(path, arrays)
     except OSError as error:
-        warnings.warn(f"{path}: this cache entry cannot be written ({error.strerror or error})", Note, stacklevel=2)
+        place = path if os.path.isdir(path) else path.parent
+        warnings.warn(f"{place}: the cache cannot be written ({error.strerror or error})", Note, stacklevel=2)
     return arrays
 
 

@@ -5,13 +5,14 @@ Exit codes: 0 done, 1 a fault of the renderer, 2 bad input. Nothing heavy is imp
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import sys
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from wgsss import __version__, saying
@@ -39,6 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except RenderError as error:
         return _fail(error, 1)
     except Stopped as stop:
+        if argv is None:
+            _leave(stop.code)
         return stop.code
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -90,6 +93,14 @@ def _told_warnings() -> Iterator[list[str]]:
             yield told
     finally:
         logging.getLogger().removeHandler(silent)
+
+
+def _leave(code: int) -> None:
+    """End the process, with what is to be done at its end, but without taking down the interpreter: threads of
+    libraries that are still at work would crash meanwhile."""
+    with suppress(Exception):
+        atexit._run_exitfuncs()
+    os._exit(code)
 
 
 def _fail(message: object, code: int) -> int:

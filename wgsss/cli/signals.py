@@ -30,18 +30,18 @@ def stoppable() -> Iterator[None]:
     A signal that is ignored already, as by nohup, stays so. After Stopped the process is about to end, and signals stay
     ignored. Only the main thread can do this; in another one nothing is changed.
     """
-    stopped = False
+    stopped = 0  # by which signal
 
     def stop(number: int, frame: Any) -> None:
         nonlocal stopped
         if not stopped:
-            stopped = True
+            stopped = number
             raise Stopped(number)
 
     def unraisable(lost: Any) -> None:
         nonlocal stopped
         if isinstance(lost.exc_value, Stopped):  # it came where Python drops exceptions, as when an object is freed
-            stopped = False
+            stopped = 0
             threading.Timer(_AGAIN_S, _send, (lost.exc_value.code - 128,)).start()
         else:
             before_hook(lost)
@@ -55,11 +55,14 @@ def stoppable() -> Iterator[None]:
         sys.unraisablehook = unraisable
     try:
         yield
+    except Exception:
+        if stopped:  # a library made another exception of it, as of what goes wrong while a module is imported
+            raise Stopped(stopped) from None
+        raise
     finally:
         sys.unraisablehook = before_hook
-        if not stopped:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if stopped else handler)
 
 
 def _send(number: int) -> None:
