@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wgsss.bake.unwrap import Surface
+from wgsss.bake.unwrap import RenderMesh
 from wgsss.scene import Mesh
 
 TILTED = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
@@ -77,9 +77,9 @@ def icosphere(radius: float, levels: int) -> Mesh:
     return Mesh(made.vertices, made.faces, name="sphere")
 
 
-def locate(mesh: Mesh, surface: Surface, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def locate(mesh: Mesh, render_mesh: RenderMesh, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (N, 3), mm, of atlas points (N, 2), and the face (N,) that each lies in or is nearest to."""
-    corners = surface.atlas.astype(float)[surface.faces]
+    corners = render_mesh.atlas.astype(float)[render_mesh.faces]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
     local = np.einsum("fij,nfj->nfi", np.linalg.inv(edges), uv[:, None] - corners[None, :, 0])
     barycentric = np.concatenate([1 - local.sum(-1, keepdims=True), local], axis=-1)

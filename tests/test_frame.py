@@ -117,10 +117,10 @@ def test_point_light_amid_the_scene_casts_shadows_all_around(gpu):
     graph = Graph(gpu)
     frame = shared.begin(graph, stage, (128, 128))
     handle = shared.irradiance_pixels(frame)
-    graph.run(handle, frame.gbuffer.where_seen, frame.gbuffer.depth)
+    graph.run(handle, frame.gbuffer.gbuffer_id, frame.gbuffer.depth)
     assert len(frame.lighting.views) == 6
     got = graph.read(handle)[..., 0]
-    ids = graph.read(frame.gbuffer.where_seen)[..., 2]
+    ids = graph.read(frame.gbuffer.gbuffer_id)[..., 2]
     clip = np.stack(np.meshgrid((np.arange(128) + 0.5) / 64 - 1, 1 - (np.arange(128) + 0.5) / 64), -1)
     clip = np.concatenate([clip, graph.read(frame.gbuffer.depth), np.ones((128, 128, 1))], -1)
     p = clip @ frame.view.clip_to_world.T
@@ -293,9 +293,9 @@ def test_texels_vertices_and_pixels_agree(gpu):
     graph = Graph(gpu)
     frame = shared.begin(graph, stage, (256, 256))
     pixels, texels = shared.irradiance_pixels(frame), shared.irradiance_texels(frame, body, 400)
-    vertices = shared.irradiance_points(frame, body, body.vertices, len(body.layout.vertex))
-    graph.run(pixels, texels, vertices, frame.gbuffer.where_seen)
-    pixels, texels, vertices, seen = (graph.read(h) for h in (pixels, texels, vertices, frame.gbuffer.where_seen))
+    vertices = shared.irradiance_points(frame, body, body.vertices, len(body.render_mesh.vertex))
+    graph.run(pixels, texels, vertices, frame.gbuffer.gbuffer_id)
+    pixels, texels, vertices, seen = (graph.read(h) for h in (pixels, texels, vertices, frame.gbuffer.gbuffer_id))
     texels = texels * frame.lighting.unit
     place = body.rest.mesh.positions[surface.vertex]
     inside = np.abs(place[:, [0, 2]]).max(axis=1) < 9

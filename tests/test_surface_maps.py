@@ -117,17 +117,17 @@ def test_light_that_enters_at_samples_has_the_colours_of_the_vertices(gpu: Gpu) 
     graph, material = Graph(gpu), replace(MATTE, color_after=0.0)
     stage = Stage(gpu, lit(DOWN, mesh=coloured_plane(), material=material))
     frame, body = shared.begin(graph, stage, (8, 8)), stage.bodies[0]
-    count = len(body.layout.faces)
+    count = len(body.render_mesh.faces)
     middles = Samples(np.arange(count, dtype=np.int32), np.full((count, 3), 1 / 3), np.ones(count))
     coloured = shared.irradiance_points(frame, body, body.points(middles), count, middles)
-    vertices = shared.irradiance_points(frame, body, body.vertices, len(body.layout.vertex))
+    vertices = shared.irradiance_points(frame, body, body.vertices, len(body.render_mesh.vertex))
     graph.run(coloured, vertices)
     x = body.at(middles).position[:, 0]
     got = graph.read(coloured)[:, :3]
     plain = got[:, 0] / (0.5 - x / 20)
     assert plain == pytest.approx(plain[0], rel=1e-4)
     assert got[:, 2] / got[:, 0] == pytest.approx((x / 20 + 0.5) / (0.5 - x / 20) * 0.25, rel=1e-4)
-    x = body.mesh.positions[body.layout.vertex][:, 0]
+    x = body.mesh.positions[body.render_mesh.vertex][:, 0]
     red = graph.read(vertices)[:, 0]
     assert red == pytest.approx(plain[0] * (0.5 - x / 20), rel=1e-4, abs=1e-4)
 

@@ -13,7 +13,7 @@ struct Vertex {
 }
 
 // What is the same over an object in all passes of a frame.
-struct Surface {
+struct ObjectUniforms {
     object_to_world: mat4x4f, // rigid
     base_color: vec3f,        // linear; multiplies the map
     color_after: Number,      // share of the base colour applied after diffusion (Mikkelsen 2009, 3.5)
@@ -29,21 +29,21 @@ const CLAMP: u32 = 1u;
 const MIRROR: u32 = 2u;
 
 // Where to sample a map of `size` texels for texture coordinates uv, with a sampler that repeats and interpolates.
-fn map_coordinates(surface: Surface, uv: vec2f, size: vec2u) -> vec2f {
+fn map_coordinates(object: ObjectUniforms, uv: vec2f, size: vec2u) -> vec2f {
     var at = uv;
     let texels = vec2f(size);
     for (var axis = 0u; axis < 2u; axis++) {
-        if surface.wrap[axis] == REPEAT {
+        if object.wrap[axis] == REPEAT {
             continue;
         }
-        if surface.wrap[axis] == MIRROR {
+        if object.wrap[axis] == MIRROR {
             let folded = at[axis] - 2.0 * floor(at[axis] / 2.0);
             at[axis] = min(folded, 2.0 - folded);
         }
         let half_texel = 0.5 / texels[axis]; // closer to the border, the other side would be mixed in
         at[axis] = clamp(at[axis], half_texel, 1.0 - half_texel);
     }
-    if surface.nearest == 1u {
+    if object.nearest == 1u {
         at = (floor(at * texels) + 0.5) / texels;
     }
     return at;
@@ -67,11 +67,11 @@ fn bent_normal(n: Direction, x: Position, uv: vec2f, texel: vec3f, slopes: Numbe
 }
 
 // The base colour's share before diffusion, col(x_i)^(1-a) (Mikkelsen 2009, 3.5). `texel` is the map's sample.
-fn color_before(surface: Surface, texel: vec3f) -> vec3f {
-    return pow(max(surface.base_color * texel, vec3f(1e-6)), vec3f(1.0 - surface.color_after));
+fn color_before(object: ObjectUniforms, texel: vec3f) -> vec3f {
+    return pow(max(object.base_color * texel, vec3f(1e-6)), vec3f(1.0 - object.color_after));
 }
 
 // The base colour's share after diffusion, col(x_o)^a.
-fn color_after(surface: Surface, texel: vec3f) -> vec3f {
-    return pow(max(surface.base_color * texel, vec3f(1e-6)), vec3f(surface.color_after));
+fn color_after(object: ObjectUniforms, texel: vec3f) -> vec3f {
+    return pow(max(object.base_color * texel, vec3f(1e-6)), vec3f(object.color_after));
 }

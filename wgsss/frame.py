@@ -40,7 +40,7 @@ class View:
 class Frame:
     """What methods draw from: the stage, the view, the g-buffer and the lights.
 
-    `gbuffer` has where_seen, normal, base_color and depth; `lighting` has lights, views and shadow_maps, and `unit`: a
+    `gbuffer` has gbuffer_id, normal, base_color and depth; `lighting` has lights, views and shadow_maps, and `unit`: a
     power of two, W/m^2, near the scene's irradiance, in which half floats hold it.
     """
 
@@ -67,14 +67,14 @@ class Frame:
         """What every module that gathers L_d binds."""
         lighting = self.lighting
         return {
-            "surface": body.surface,
+            "object": body.object_uniforms,
             "lights": lighting.lights,
             "views": lighting.views,
             "shadow_maps": lighting.shadow_maps,
             "rho_dt_table": self.rho_dt_table(body),
         }
 
-    def seen(self, *names: str) -> dict[str, Any]:
+    def gbuffer_bindings(self, *names: str) -> dict[str, Any]:
         """Parts of the g-buffer by binding name."""
         return {name: getattr(self.gbuffer, name) for name in names}
 
@@ -142,7 +142,7 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
     params = {"world_to_clip": view.world_to_clip, "eye": view.eye}
     drawn: Any = None
     for body in stage.bodies:
-        kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("where_seen", "normal", "base_color")}
+        kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("gbuffer_id", "normal", "base_color")}
         drawn = graph.draw(
             "frame/gbuffer",
             size=size,
@@ -150,7 +150,7 @@ def _gbuffer(graph: Graph, stage: Stage, size: tuple[int, int], view: View) -> S
             depth_buffer="new" if drawn is None else drawn.depth,
             into=kept,
             params=params,
-            surface=body.surface,
+            object=body.object_uniforms,
             vertices=body.vertices,
             colors=body.colors,
             **vars(body.maps),
@@ -200,7 +200,7 @@ def _irradiance_pixels(frame: Frame) -> Handle:
             count=6,
             params={"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)},
             environment=body.environment.irradiance,
-            **frame.seen("where_seen", "normal", "depth"),
+            **frame.gbuffer_bindings("gbuffer_id", "normal", "depth"),
             **frame.light_bindings(body),
         )
     return irradiance
@@ -273,7 +273,7 @@ def _specular(frame: Frame) -> Handle | None:
             count=6,
             params=params,
             reflection=body.environment.reflection,
-            **frame.seen("where_seen", "normal", "depth"),
+            **frame.gbuffer_bindings("gbuffer_id", "normal", "depth"),
             **frame.light_bindings(body),
         )
     return reflected
@@ -288,7 +288,7 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
             into=radiance,
             size=frame.size,
             count=6,
-            surface=body.surface,
+            object=body.object_uniforms,
             params={
                 "clip_to_world": frame.view.clip_to_world,
                 "eye": frame.view.eye,
@@ -298,7 +298,7 @@ def composite(frame: Frame, M_front: Handle, M_back: Handle | None, reflected: H
             M_front=M_front,
             M_back=M_back or frame.stage.gpu.black,
             specular=reflected or frame.stage.gpu.black,
-            **frame.seen("where_seen", "normal", "depth"),
+            **frame.gbuffer_bindings("gbuffer_id", "normal", "depth"),
         )
     return radiance
 

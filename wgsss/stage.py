@@ -14,7 +14,7 @@ from wgsss import wgsl
 from wgsss.bake.environment import Divided, Prefiltered, divided, prefilter
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
-from wgsss.bake.unwrap import Surface, split, unwrap
+from wgsss.bake.unwrap import RenderMesh, split, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
 from wgsss.scene.light import Light
@@ -103,13 +103,13 @@ class Body:
     def material(self) -> Material:
         return self.rest.material
 
-    def unwrap(self) -> Surface:
+    def unwrap(self) -> RenderMesh:
         """Give the body an atlas, which texture-space passes need. The first time takes a while."""
         self._unwrapped = True
-        return self.layout
+        return self.render_mesh
 
     @property
-    def layout(self) -> Surface:
+    def render_mesh(self) -> RenderMesh:
         """The render mesh: with an atlas where one was asked for."""
         mesh, gpu = self.rest.mesh, self.stage.gpu
         if self._unwrapped:
@@ -127,14 +127,14 @@ class Body:
         return self._posed[1]
 
     def _upload(self, mesh: Mesh) -> Any:
-        layout = self.layout
+        render_mesh = self.render_mesh
         value = {
-            "position": mesh.positions[layout.vertex],
-            "u": layout.uvs[:, 0],
+            "position": mesh.positions[render_mesh.vertex],
+            "u": render_mesh.uvs[:, 0],
             "normal": self._normals(mesh),
-            "v": layout.uvs[:, 1],
-            "atlas": layout.atlas,
-            "welded": layout.vertex,
+            "v": render_mesh.uvs[:, 1],
+            "atlas": render_mesh.atlas,
+            "welded": render_mesh.vertex,
             "sky": self.sky,
         }
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
@@ -142,19 +142,19 @@ class Body:
     @property
     def sky(self) -> Any:
         """The share of the environment's irradiance (R,) that arrives at the render vertices, at rest."""
-        lights, layout = self.stage.environments(), self.layout
+        lights, render_mesh = self.stage.environments(), self.render_mesh
         if not lights:
-            return np.ones(len(layout.vertex), np.float32)
+            return np.ones(len(render_mesh.vertex), np.float32)
 
         def make() -> Any:
             turn, shift = self.rest.matrix[:3, :3], self.rest.matrix[:3, 3]
-            positions = self.rest.mesh.positions[layout.vertex] @ turn.T + shift
-            return sky_visibility(self.stage.rest, lights, positions, layout.normals @ turn.T)
+            positions = self.rest.mesh.positions[render_mesh.vertex] @ turn.T + shift
+            return sky_visibility(self.stage.rest, lights, positions, render_mesh.normals @ turn.T)
 
         return self.stage.shared(("sky", self.index, self._unwrapped), make)
 
     def _normals(self, mesh: Mesh) -> Any:
-        return self.layout.normals if mesh is self.rest.mesh else mesh.normals[self.layout.vertex]
+        return self.render_mesh.normals if mesh is self.rest.mesh else mesh.normals[self.render_mesh.vertex]
 
     @property
     def mesh(self) -> Mesh:
@@ -164,10 +164,10 @@ class Body:
     def at(self, samples: Samples) -> SimpleNamespace:
         """Samples of the surface as posed, in object space: position (N, 3) in mm, normal (N, 3) of length 1, uv (N, 2)
         and area (N,) in mm^2, float32."""
-        mesh, layout = self.mesh, self.layout
-        corners = mesh.positions[layout.vertex][layout.faces].astype(np.float64)
+        mesh, render_mesh = self.mesh, self.render_mesh
+        corners = mesh.positions[render_mesh.vertex][render_mesh.faces].astype(np.float64)
         area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        triangle = layout.faces[samples.face]
+        triangle = render_mesh.faces[samples.face]
 
         def between(values: Any) -> Any:
             return np.einsum("nk,nkd->nd", samples.barycentric, values[triangle])
@@ -175,9 +175,9 @@ class Body:
         normal = between(self._normals(mesh))
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
         return SimpleNamespace(
-            position=between(mesh.positions[layout.vertex]).astype(np.float32),
+            position=between(mesh.positions[render_mesh.vertex]).astype(np.float32),
             normal=normal.astype(np.float32),
-            uv=between(layout.uvs).astype(np.float32),
+            uv=between(render_mesh.uvs).astype(np.float32),
             area=(area[samples.face] * samples.share).astype(np.float32),
         )
 
@@ -191,7 +191,7 @@ class Body:
             "v": at.uv[:, 1],
             "atlas": np.zeros_like(at.uv),
             "welded": np.zeros(len(at.uv), np.uint32),
-            "sky": np.einsum("nk,nk->n", samples.barycentric, self.sky[self.layout.faces[samples.face]]),
+            "sky": np.einsum("nk,nk->n", samples.barycentric, self.sky[self.render_mesh.faces[samples.face]]),
         }
         return self.stage.gpu.buffer(wgsl.load("mesh").layout("array<Vertex>").pack(value))
 
@@ -206,7 +206,7 @@ class Body:
         if self.rest.mesh.corner_colors is None:
             return self._white
         key = ("colors", self.index, self._unwrapped)
-        return self.stage.shared(key, lambda: self._color_buffer(self.layout.colors))
+        return self.stage.shared(key, lambda: self._color_buffer(self.render_mesh.colors))
 
     def colors_at(self, samples: Samples) -> Any:
         """A buffer of vec4f: the vertex colours at samples of the surface, or one for all."""
@@ -214,7 +214,7 @@ class Body:
             return self._white
 
         def make() -> tuple[Samples, Any]:
-            at = self.layout.colors[self.layout.faces[samples.face]]
+            at = self.render_mesh.colors[self.render_mesh.faces[samples.face]]
             return samples, self._color_buffer(np.einsum("nk,nkd->nd", samples.barycentric, at))
 
         # The samples are kept beside the buffer, so that no others can have their id.
@@ -231,11 +231,11 @@ class Body:
     def indices(self) -> Any:
         """The index buffer, u32."""
         key = ("indices", id(self.rest.mesh), self._unwrapped)
-        return self.stage.shared(key, lambda: self.stage.gpu.buffer(self.layout.faces.astype(np.uint32)))
+        return self.stage.shared(key, lambda: self.stage.gpu.buffer(self.render_mesh.faces.astype(np.uint32)))
 
     @property
-    def surface(self) -> dict[str, Any]:
-        """The value of struct Surface (wgsl/mesh.wgsl)."""
+    def object_uniforms(self) -> dict[str, Any]:
+        """The value of struct ObjectUniforms (wgsl/mesh.wgsl)."""
         material = self.material
         return {
             "object_to_world": self.rest.matrix,

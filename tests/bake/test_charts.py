@@ -10,7 +10,7 @@ from wgsss import wgsl
 from wgsss.bake.charts import INSIDE, Charts, charts
 from wgsss.bake.seams import apply, find_seams
 from wgsss.bake.stretch import stretch
-from wgsss.bake.unwrap import Surface, unwrap
+from wgsss.bake.unwrap import RenderMesh, unwrap
 from wgsss.gpu import Gpu
 from wgsss.scene import Mesh
 
@@ -30,8 +30,8 @@ class Baked:
 
     def __init__(self, gpu: Gpu, mesh: Mesh, size: int) -> None:
         self.mesh, self.size = mesh, size
-        self.surface: Surface = unwrap(gpu, mesh)
-        made: Charts = charts(gpu, mesh, self.surface, size)
+        self.render_mesh: RenderMesh = unwrap(gpu, mesh)
+        made: Charts = charts(gpu, mesh, self.render_mesh, size)
         self.gradient_u = gpu.read_texture(made.gradient_u).astype(np.float64)
         self.gradient_v = gpu.read_texture(made.gradient_v).astype(np.float64)
         self.ids = gpu.read_texture(made.ids)[..., 0]
@@ -104,7 +104,7 @@ def test_clearance_is_a_tight_lower_bound(gpu: Gpu) -> None:
 
 def test_gutter_is_three_texels_wide(gpu: Gpu) -> None:
     baked = Baked(gpu, box(1), 256)
-    seams = find_seams(baked.surface, stretch(baked.mesh, baked.surface).root)
+    seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
     row, column = np.nonzero(~baked.inside)
     texel = np.stack([column + 0.5, row + 0.5], axis=-1)
     a, b = 256 * seams.ends[:, 0], 256 * seams.ends[:, 1]
@@ -120,14 +120,14 @@ def test_seams_fold_around_the_edges_of_a_box(gpu: Gpu, seed: int) -> None:
     """A point h mm beyond the edge of a side is on the next side, h mm from the edge."""
     baked = Baked(gpu, box(seed, cells=2), 512)
     uv, to, seam = baked.across()
-    seams = find_seams(baked.surface, stretch(baked.mesh, baked.surface).root)
+    seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
     single = seam < len(seams.maps)  # around corners of the box two sides are crossed, and there is no one answer
     uv, to, seam = uv[single], to[single], seam[single]
     assert single.mean() > 0.8
     a, b = seams.ends[seam, 0], seams.ends[seam, 1]
     # Just inside of the edge's middle is the chart that the texel is beside of; its affine map extends over the edge.
-    _, face = locate(baked.mesh, baked.surface, 0.5 * (a + b) - 1e-4 * (to_left(b - a) * seams.outward[seam, None]))
-    corners = baked.surface.atlas.astype(float)[baked.surface.faces[face]]
+    _, face = locate(baked.mesh, baked.render_mesh, 0.5 * (a + b) - 1e-4 * (to_left(b - a) * seams.outward[seam, None]))
+    corners = baked.render_mesh.atlas.astype(float)[baked.render_mesh.faces[face]]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
     local = np.linalg.solve(edges, (uv - corners[:, 0])[..., None])[..., 0]
     p = baked.mesh.positions.astype(float)[baked.mesh.faces[face]]
@@ -136,8 +136,8 @@ def test_seams_fold_around_the_edges_of_a_box(gpu: Gpu, seed: int) -> None:
     n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     folded -= n / np.linalg.norm(n, axis=1, keepdims=True) * np.linalg.norm(flat - folded, axis=1, keepdims=True)
     beside_corner = (np.abs(flat) > 5.001).sum(axis=1) > 1
-    found, arrived = locate(baked.mesh, baked.surface, to)
-    assert (baked.surface.charts[arrived] != baked.surface.charts[face])[~beside_corner].all()
+    found, arrived = locate(baked.mesh, baked.render_mesh, to)
+    assert (baked.render_mesh.charts[arrived] != baked.render_mesh.charts[face])[~beside_corner].all()
     assert np.abs(found - folded)[~beside_corner].max() < 1e-3
 
 
@@ -178,9 +178,9 @@ def test_open_edges_mirror_the_surface(gpu: Gpu, name: str) -> None:
 @pytest.mark.parametrize("make", [lambda: box(5), cylinder, lambda: icosphere(20, 3), lambda: sheet(MAPS["sheared"])])
 def test_there_and_back_is_the_identity_on_the_edge(gpu: Gpu, make: object) -> None:
     mesh = make()  # type: ignore[operator]
-    surface = unwrap(gpu, mesh)
-    seams = find_seams(surface, stretch(mesh, surface).root)
-    position = np.stack([locate(mesh, surface, seams.ends[:, k])[0] for k in (0, 1)], axis=1)
+    render_mesh = unwrap(gpu, mesh)
+    seams = find_seams(render_mesh, stretch(mesh, render_mesh).root)
+    position = np.stack([locate(mesh, render_mesh, seams.ends[:, k])[0] for k in (0, 1)], axis=1)
     for share in (0.0, 0.3, 1.0):
         point = seams.ends[:, 0] + share * (seams.ends[:, 1] - seams.ends[:, 0])
         there = apply(seams.maps, point)
@@ -193,7 +193,7 @@ def test_there_and_back_is_the_identity_on_the_edge(gpu: Gpu, make: object) -> N
         assert gap.min(axis=1).max() < 1e-6
         np.testing.assert_allclose(apply(seams.maps[gap.argmin(axis=1)], there), point, atol=1e-6)
         np.testing.assert_allclose(
-            locate(mesh, surface, there)[0], position[:, 0] + share * (position[:, 1] - position[:, 0]), atol=1e-3
+            locate(mesh, render_mesh, there)[0], position[:, 0] + share * (position[:, 1] - position[:, 0]), atol=1e-3
         )
 
 
@@ -201,16 +201,16 @@ def test_there_and_back_is_the_identity_on_the_edge(gpu: Gpu, make: object) -> N
 def test_gutter_of_a_closed_surface_is_the_neighbouring_chart(gpu: Gpu, size: int) -> None:
     """On a sphere in several charts, a gutter texel is as far from its chart's border on the surface as in the map."""
     baked = Baked(gpu, icosphere(20, 3), size)
-    seams = find_seams(baked.surface, stretch(baked.mesh, baked.surface).root)
+    seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
     uv, to, seam = baked.across()
     single = np.flatnonzero(seam < len(seams.maps))[::5]
     assert len(single) > 0.97 / 5 * len(seam)
     uv, to, seam = uv[single], to[single], seam[single]
     a, b = seams.ends[seam, 0], seams.ends[seam, 1]
     t = np.clip(np.einsum("ni,ni->n", uv - a, b - a) / ((b - a) ** 2).sum(-1), 0, 1)[:, None]
-    foot, home = locate(baked.mesh, baked.surface, a + t * (b - a))
-    found, away = locate(baked.mesh, baked.surface, to)
-    assert (baked.surface.charts[home] != baked.surface.charts[away]).mean() > 0.98
+    foot, home = locate(baked.mesh, baked.render_mesh, a + t * (b - a))
+    found, away = locate(baked.mesh, baked.render_mesh, to)
+    assert (baked.render_mesh.charts[home] != baked.render_mesh.charts[away]).mean() > 0.98
     texel = np.sqrt(baked.mesh.area / baked.inside.sum())  # mm, on average; the atlas is stretched to fill the map
     ratio = np.linalg.norm(found - foot, axis=1) / (texel * size * np.linalg.norm(uv - a - t * (b - a), axis=1))
     assert 0.6 < ratio.min()

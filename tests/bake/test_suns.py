@@ -214,7 +214,7 @@ def test_softboxes_light_a_body_smoothly(gpu: Gpu, tmp_path: Path) -> None:
     """A convex body hides nothing from itself: all its vertices see what is above their horizon."""
     light = EnvironmentLight(file=write_environment(tmp_path / "sky.exr", softboxes()))
     stage = Stage(gpu, lit(light, mesh=sphere(radius=5.0, vertices=4000)))
-    n = stage.bodies[0].layout.normals.astype(np.float64)
+    n = stage.bodies[0].render_mesh.normals.astype(np.float64)
     E = irradiance(softboxes(), n).mean(axis=1)
     hidden = (1.0 - stage.bodies[0].sky) * E
     assert hidden.max() < 0.01 * E.max()

@@ -13,7 +13,7 @@ from atlases import box, cylinder, icosphere, sheet
 from wgsss.bake import atlas
 from wgsss.bake.atlas import LIBRARIES, VARIABLE
 from wgsss.bake.charts import INSIDE, charts
-from wgsss.bake.unwrap import Surface, is_unique, split, unwrap
+from wgsss.bake.unwrap import RenderMesh, is_unique, split, unwrap
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
 from wgsss.scene import Mesh, load_mesh
@@ -36,45 +36,47 @@ def joined(*meshes: Mesh) -> Mesh:
     return Mesh(positions, faces, corner_uvs=np.concatenate([m.corner_uvs for m in meshes]))
 
 
-def check(mesh: Mesh, surface: Surface) -> None:
+def check(mesh: Mesh, render_mesh: RenderMesh) -> None:
     """What holds for any render mesh."""
-    np.testing.assert_array_equal(surface.vertex[surface.faces], mesh.faces)
-    np.testing.assert_array_equal(surface.normals[surface.faces], mesh.shading_normals)
+    np.testing.assert_array_equal(render_mesh.vertex[render_mesh.faces], mesh.faces)
+    np.testing.assert_array_equal(render_mesh.normals[render_mesh.faces], mesh.shading_normals)
     if mesh.corner_uvs is not None:
-        np.testing.assert_array_equal(surface.uvs[surface.faces], mesh.corner_uvs)
-    rows = np.concatenate([surface.vertex[:, None], surface.normals, surface.atlas, surface.uvs], axis=1)
+        np.testing.assert_array_equal(render_mesh.uvs[render_mesh.faces], mesh.corner_uvs)
+    rows = np.concatenate(
+        [render_mesh.vertex[:, None], render_mesh.normals, render_mesh.atlas, render_mesh.uvs], axis=1
+    )
     assert len(np.unique(rows, axis=0)) == len(rows), "a vertex was split without need"
-    assert surface.atlas.min() >= 0
-    assert surface.atlas.max() <= 1
-    assert set(surface.charts) == set(range(surface.charts.max() + 1))
-    assert surface.faces.dtype == surface.charts.dtype == surface.vertex.dtype == np.int32
-    assert surface.atlas.dtype == surface.uvs.dtype == surface.normals.dtype == np.float32
+    assert render_mesh.atlas.min() >= 0
+    assert render_mesh.atlas.max() <= 1
+    assert set(render_mesh.charts) == set(range(render_mesh.charts.max() + 1))
+    assert render_mesh.faces.dtype == render_mesh.charts.dtype == render_mesh.vertex.dtype == np.int32
+    assert render_mesh.atlas.dtype == render_mesh.uvs.dtype == render_mesh.normals.dtype == np.float32
 
 
 @pytest.mark.parametrize("make", [box, cylinder, lambda: sheet(0.03 * np.array([[1, 0.5], [0, -1]]))])
 def test_unique_coordinates_are_kept(gpu: Gpu, make: object) -> None:
     mesh = make()  # type: ignore[operator]
-    surface = unwrap(gpu, mesh)
-    check(mesh, surface)
-    np.testing.assert_array_equal(surface.atlas[surface.faces], mesh.corner_uvs)
-    assert surface.charts.max() + 1 == {"box": 6, "cylinder": 1, "sheet": 1}[mesh.name]
+    render_mesh = unwrap(gpu, mesh)
+    check(mesh, render_mesh)
+    np.testing.assert_array_equal(render_mesh.atlas[render_mesh.faces], mesh.corner_uvs)
+    assert render_mesh.charts.max() + 1 == {"box": 6, "cylinder": 1, "sheet": 1}[mesh.name]
 
 
 def test_hard_edges_split_normals_but_not_charts(gpu: Gpu) -> None:
     mesh = sheet(np.eye(2) * 0.03, cells=2)
     normals = np.broadcast_to(np.eye(3)[np.arange(len(mesh.faces)) % 3][:, None], (len(mesh.faces), 3, 3))
     hard = Mesh(mesh.positions, mesh.faces, corner_uvs=mesh.corner_uvs, corner_normals=normals)
-    surface = unwrap(gpu, hard)
-    check(hard, surface)
-    assert len(surface.vertex) > len(mesh.positions)
-    assert surface.charts.max() == 0
+    render_mesh = unwrap(gpu, hard)
+    check(hard, render_mesh)
+    assert len(render_mesh.vertex) > len(mesh.positions)
+    assert render_mesh.charts.max() == 0
 
 
 def test_split_only_splits(gpu: Gpu) -> None:
     smooth = icosphere(10, 2)
-    surface = split(smooth)
-    assert len(surface.vertex) == len(smooth.positions)
-    check(smooth, surface)
+    render_mesh = split(smooth)
+    assert len(render_mesh.vertex) == len(smooth.positions)
+    check(smooth, render_mesh)
     check(box(), split(box()))
     assert not split(box()).atlas.any()
 
@@ -91,9 +93,9 @@ def test_overlaps_are_found(gpu: Gpu, library: str) -> None:
     overlapped = joined(left, little)
     assert not is_unique(gpu, overlapped, overlapped.corner_uvs)
     for mesh in (twice, mirror, overlapped):
-        surface = unwrap(gpu, mesh)
-        check(mesh, surface)
-        assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+        render_mesh = unwrap(gpu, mesh)
+        check(mesh, render_mesh)
+        assert is_unique(gpu, mesh, render_mesh.atlas[render_mesh.faces])
 
 
 def test_coordinates_without_area_do_not_serve(gpu: Gpu) -> None:
@@ -106,10 +108,10 @@ def test_coordinates_without_area_do_not_serve(gpu: Gpu) -> None:
 
 def test_coordinates_beyond_the_square_are_fitted(gpu: Gpu) -> None:
     mesh = sheet(np.eye(2) * 0.2, center=(3, -1))
-    surface = unwrap(gpu, mesh)
-    check(mesh, surface)
-    assert surface.charts.max() == 0
-    np.testing.assert_allclose(surface.atlas.max(axis=0), 1)
+    render_mesh = unwrap(gpu, mesh)
+    check(mesh, render_mesh)
+    assert render_mesh.charts.max() == 0
+    np.testing.assert_allclose(render_mesh.atlas.max(axis=0), 1)
 
 
 @pytest.mark.parametrize("radius", [20, 1e-3, 1e4])
@@ -117,12 +119,12 @@ def test_sphere(gpu: Gpu, radius: float, library: str) -> None:
     from scipy.ndimage import distance_transform_edt
 
     mesh = icosphere(radius, 3)
-    surface = unwrap(gpu, mesh)
-    check(mesh, surface)
-    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
-    count = surface.charts.max() + 1
+    render_mesh = unwrap(gpu, mesh)
+    check(mesh, render_mesh)
+    assert is_unique(gpu, mesh, render_mesh.atlas[render_mesh.faces])
+    count = render_mesh.charts.max() + 1
     assert count <= 16, "many small charts: the scale of the mesh must not matter"
-    ids = gpu.read_texture(charts(gpu, mesh, surface, 1024).ids)[..., 0]
+    ids = gpu.read_texture(charts(gpu, mesh, render_mesh, 1024).ids)[..., 0]
     assert (ids >= INSIDE).mean() > 0.4
     for chart in range(count):
         distance = distance_transform_edt(ids != (INSIDE | chart))
@@ -139,9 +141,9 @@ def test_same_atlas_every_time(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.Mon
 def test_faces_without_area(gpu: Gpu, library: str) -> None:
     mesh = icosphere(10, 2)
     with_sliver = Mesh(mesh.positions, np.concatenate([mesh.faces, [[0, 1, 1]]]))
-    surface = unwrap(gpu, with_sliver)
-    check(with_sliver, surface)
-    assert np.isfinite(gpu.read_texture(charts(gpu, with_sliver, surface, 128).gradient_u)).all()
+    render_mesh = unwrap(gpu, with_sliver)
+    check(with_sliver, render_mesh)
+    assert np.isfinite(gpu.read_texture(charts(gpu, with_sliver, render_mesh, 128).gradient_u)).all()
     with pytest.raises(InputError, match="no face has an area"):
         unwrap(gpu, Mesh(np.eye(3) * [1, 2, 0], [[0, 1, 1]]))
 
@@ -157,20 +159,20 @@ def test_scans(gpu: Gpu, library: str, data: Path, file: str, faces: int | None,
     if faces:  # an open piece; all of it takes xatlas half a minute
         used, index = np.unique(mesh.faces[:faces], return_inverse=True)
         mesh = Mesh(mesh.positions[used], index.reshape(-1, 3))
-    surface = unwrap(gpu, mesh)
-    check(mesh, surface)
-    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
-    assert own == (mesh.corner_uvs is not None and surface.charts.max() < 20)
+    render_mesh = unwrap(gpu, mesh)
+    check(mesh, render_mesh)
+    assert is_unique(gpu, mesh, render_mesh.atlas[render_mesh.faces])
+    assert own == (mesh.corner_uvs is not None and render_mesh.charts.max() < 20)
 
 
 def test_many_separate_pieces_share_one_page(gpu: Gpu, library: str) -> None:
     random = np.random.default_rng(4)
     corners = (10 * random.normal(size=(1500, 1, 3)) + random.normal(size=(1500, 3, 3))).reshape(-1, 3)
     mesh = Mesh(corners, np.arange(4500).reshape(-1, 3))
-    surface = unwrap(gpu, mesh)
-    check(mesh, surface)
-    assert surface.charts.max() + 1 == 1500
-    assert is_unique(gpu, mesh, surface.atlas[surface.faces])
+    render_mesh = unwrap(gpu, mesh)
+    check(mesh, render_mesh)
+    assert render_mesh.charts.max() + 1 == 1500
+    assert is_unique(gpu, mesh, render_mesh.atlas[render_mesh.faces])
 
 
 def test_the_library_is_chosen_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:

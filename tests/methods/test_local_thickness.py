@@ -288,7 +288,7 @@ def test_the_texels_of_a_g_buffer(gpu: Gpu, even: None, kind: str) -> None:
         stage = Stage(gpu, replace(lit(BELOW, camera=replace(ABOVE, height=40)), objects=tuple(things)))
         graph = Graph(gpu)
         assert method.M_back(shared.begin(graph, stage, (40, 40)), Lambert()) is not None
-        stored = [item.writes["stored"] for item in graph.passes if item.module.name == "thickness/gbuffer"][-1]
+        stored = [item.writes["stored"] for item in graph.passes if item.module.name == "local_thickness/gbuffer"][-1]
         graph.run(stored)
         found = graph.read(stored)[20, 5 : 10 * number : 10]
         assert found.tolist() == [texel(i, number > 1) for i in range(number)]

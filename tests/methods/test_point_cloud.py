@@ -47,8 +47,8 @@ class Passes:
         entering = passed.reads["entering"]
         irradiance = shared.irradiance_pixels(frame)
         wanted = [drawn.M_front, drawn.M_back, irradiance, entering, frame.gbuffer.depth, frame.gbuffer.normal]
-        graph.run(*wanted, frame.gbuffer.where_seen)
-        self.seen = graph.read(frame.gbuffer.where_seen)[..., 2] > 0
+        graph.run(*wanted, frame.gbuffer.gbuffer_id)
+        self.seen = graph.read(frame.gbuffer.gbuffer_id)[..., 2] > 0
         self.M_front, self.M_back, self.irradiance = (graph.read(h)[self.seen][:, :3].astype(float) for h in wanted[:3])
         self.nodes = graph.read(entering)
         self.normal = graph.read(frame.gbuffer.normal)[self.seen][:, :3].astype(float)

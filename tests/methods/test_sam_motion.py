@@ -341,10 +341,10 @@ def seen(stage, M):
         size=frame.size,
         indices=body.indices,
         params={"world_to_clip": frame.view.world_to_clip},
-        surface=body.surface,
+        object=body.object_uniforms,
         vertices=body.vertices,
         M_back_at=stage.gpu.buffer(np.column_stack([M, np.ones(len(M))]).astype(np.float32)),
-        **frame.seen("where_seen", "base_color", "depth"),
+        **frame.gbuffer_bindings("gbuffer_id", "base_color", "depth"),
     )
     graph.run(drawn)
     image = graph.read(drawn)

@@ -58,12 +58,12 @@ def places(gpu, scene, size):
     """World position (H, W, 3) and object of each pixel."""
     graph = Graph(gpu)
     frame = shared.begin(graph, Stage(gpu, scene), (size, size))
-    graph.run(frame.gbuffer.depth, frame.gbuffer.where_seen)
+    graph.run(frame.gbuffer.depth, frame.gbuffer.gbuffer_id)
     depth = graph.read(frame.gbuffer.depth)[..., 0].astype(float)
     t = (np.arange(size) + 0.5) / size
     clip = np.stack(np.broadcast_arrays(2 * t - 1, 1 - 2 * t[:, None], depth, 1.0), axis=-1)
     x = clip @ np.asarray(frame.view.clip_to_world).T
-    return x[..., :3] / x[..., 3:], graph.read(frame.gbuffer.where_seen)[..., 2]
+    return x[..., :3] / x[..., 3:], graph.read(frame.gbuffer.gbuffer_id)[..., 2]
 
 
 def edge_error(gpu, camera, method, size=128):

@@ -78,7 +78,11 @@ def test_a_point_light_behind_a_slab(gpu, z, views):
     light = PointLight((light_x, light_y, z), (intensity,) * 3)
     camera = replace(FRONT, height=48)
     image = frame(gpu, lit(light, mesh=slab((80.0, 80.0, 2.0), 1000), material=WAX, camera=camera))
-    met = [item.writes["x_i"].size for item in image.graph.passes if item.module.name == "tsm/meet"]
+    met = [
+        item.writes["x_i"].size
+        for item in image.graph.passes
+        if item.module.name == "translucent_shadow_maps/first_hit"
+    ]
     assert met == [(1024, 1024) if views == 1 else (512, 512)] * views
     x, y = pixels(camera.height)
     depth = -1.0 - z
@@ -150,7 +154,7 @@ def test_a_single_light_shares_the_surfaces_maps_and_brings_the_sky(gpu):
 @pytest.mark.parametrize("lights", [(SKY,), (PointLight((0, 0, -50), (0, 0, 0)), SKY), ()], ids=["sky", "dark", "none"])
 def test_where_no_light_is_there_are_no_passes(gpu, lights):
     image = frame(gpu, lit(*lights, mesh=slab(vertices=100), material=WAX, camera=FRONT))
-    assert not [item for item in image.graph.passes if item.module.name.startswith("tsm/")]
+    assert not [item for item in image.graph.passes if item.module.name.startswith("translucent_shadow_maps/")]
     assert sum(item.module.name == "texture_space/dilate" for item in image.graph.passes) == 1
     assert not image.aovs["M_back"].any()
 

@@ -71,7 +71,7 @@ def test_layers_of_the_scene_are_the_same_for_all_methods_and_as_coloured(
     gpu: Gpu, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     colour = np.array([0.2, 0.5, 0.8])
-    monkeypatch.setitem(layers._PAINTED, "thickness", lambda body: np.tile(colour, (len(body.layout.vertex), 1)))
+    monkeypatch.setitem(layers._PAINTED, "thickness", lambda body: np.tile(colour, (len(body.render_mesh.vertex), 1)))
     drawing = Easel(gpu).draw(load_scene("sphere", vertices=500), METHODS, SIZE, layer="thickness")
     first, second = drawing.pictures
     assert first.display is second.display and first.display is not None
@@ -86,7 +86,7 @@ def test_thickness_is_that_of_the_render_vertices(gpu: Gpu) -> None:
     (body,) = stage.bodies
     wanted = local_thickness(body.rest.mesh, body.material.profile)
     assert wanted.max() > 0.1
-    np.testing.assert_array_equal(layers._thickness(body), wanted[body.layout.vertex])
+    np.testing.assert_array_equal(layers._thickness(body), wanted[body.render_mesh.vertex])
 
 
 def test_a_shadow_map_shows_what_the_light_sees(gpu: Gpu) -> None:

@@ -1,7 +1,7 @@
 // Radiance towards the viewer (Maisch & Ropinski 2017, eq. 5): rho_dt(x_o, w_o) / pi (M_front + M_back) + specular.
 
 import package::units::{PI};
-import package::mesh::{Surface};
+import package::mesh::{ObjectUniforms};
 import package::rho_dt::{rho_dt};
 import package::screen::{position_of_pixel, direction_to_eye};
 import package::rectangle::{rectangle_corner};
@@ -14,8 +14,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var depth: texture_depth_2d;
 @group(0) @binding(5) var rho_dt_table: texture_2d<f32>;
@@ -35,7 +35,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);

@@ -1,7 +1,7 @@
 // What is seen at each pixel: which object, where in its atlas, its normal, base colour and specular scale.
 
 import package::units::{Number};
-import package::mesh::{Vertex, Surface, bent_normal, map_coordinates};
+import package::mesh::{Vertex, ObjectUniforms, bent_normal, map_coordinates};
 import package::targets::{RGBA32Float, RGBA16Float, RGBA8UnormSrgb};
 
 struct Params {
@@ -10,7 +10,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var base_color_map: texture_2d<f32>;
 @group(0) @binding(4) var normal_map: texture_2d<f32>;
@@ -29,7 +29,7 @@ struct Varying {
 }
 
 struct GBuffer {
-    @location(0) where_seen: RGBA32Float, // atlas u, v; object id; share of the sky that is not hidden
+    @location(0) gbuffer_id: RGBA32Float, // atlas u, v; object id; share of the sky that is not hidden
     @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
     @location(2) base_color: RGBA8UnormSrgb, // of map and vertices alone: 8 bits hold them, but not their products
 }
@@ -37,25 +37,25 @@ struct GBuffer {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
-    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
+    let n = object.object_to_world * vec4f(vertex.normal, 0.0);
     let color = colors[min(i, arrayLength(&colors) - 1u)].rgb;
     return Varying(params.world_to_clip * x, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.atlas, vertex.sky, color);
 }
 
 @fragment
 fn fs(in: Varying) -> GBuffer {
-    let normal_at = map_coordinates(surface, in.uv, textureDimensions(normal_map));
+    let normal_at = map_coordinates(object, in.uv, textureDimensions(normal_map));
     let slope = textureSample(normal_map, linear_repeat, normal_at).xyz;
-    var n = bent_normal(normalize(in.normal), in.position, in.uv, slope, surface.normal_scale);
+    var n = bent_normal(normalize(in.normal), in.position, in.uv, slope, object.normal_scale);
     let to_eye = params.eye.xyz - in.position * params.eye.w;
     let facing = cross(dpdx(in.position), dpdy(in.position)); // an open sheet seen from behind shows its back
     if dot(in.normal, to_eye) < 0.0 && dot(in.normal, facing) * dot(facing, to_eye) < 0.0 {
         n = -n;
     }
-    let specular_at = map_coordinates(surface, in.uv, textureDimensions(specular_map));
-    let specular = surface.specular * textureSample(specular_map, linear_repeat, specular_at).r;
-    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
+    let specular_at = map_coordinates(object, in.uv, textureDimensions(specular_map));
+    let specular = object.specular * textureSample(specular_map, linear_repeat, specular_at).r;
+    let color_at = map_coordinates(object, in.uv, textureDimensions(base_color_map));
     let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
-    return GBuffer(vec4f(in.atlas, f32(surface.id), in.sky), vec4f(n, specular), vec4f(color, 1.0));
+    return GBuffer(vec4f(in.atlas, f32(object.id), in.sky), vec4f(n, specular), vec4f(color, 1.0));
 }

@@ -1,6 +1,6 @@
 // L_d at the pixels of one object.
 
-import package::mesh::{Surface};
+import package::mesh::{ObjectUniforms};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::screen::{position_of_pixel};
@@ -13,8 +13,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var depth: texture_depth_2d;
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
@@ -37,8 +37,8 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    let seen = textureLoad(where_seen, texel, 0);
-    if u32(seen.z) != surface.id {
+    let seen = textureLoad(gbuffer_id, texel, 0);
+    if u32(seen.z) != object.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);

@@ -1,10 +1,10 @@
 // L_d at points on one object: its vertices, or any others. Normal maps, which need derivatives, are left out.
 
-import package::mesh::{Vertex, Surface, color_before, map_coordinates};
+import package::mesh::{Vertex, ObjectUniforms, color_before, map_coordinates};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 
-@group(0) @binding(0) var<uniform> surface: Surface;
+@group(0) @binding(0) var<uniform> object: ObjectUniforms;
 @group(0) @binding(1) var<storage, read> points: array<Vertex>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 @group(0) @binding(3) var<storage, read> views: array<ShadowView>;
@@ -25,14 +25,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let point = points[id.x];
-    let x = (surface.object_to_world * vec4f(point.position, 1.0)).xyz;
-    let n = normalize((surface.object_to_world * vec4f(point.normal, 0.0)).xyz);
+    let x = (object.object_to_world * vec4f(point.position, 1.0)).xyz;
+    let n = normalize((object.object_to_world * vec4f(point.normal, 0.0)).xyz);
     let uv = vec2f(point.u, point.v);
-    let color_at = map_coordinates(surface, uv, textureDimensions(base_color_map));
+    let color_at = map_coordinates(object, uv, textureDimensions(base_color_map));
     let texel = textureSampleLevel(base_color_map, linear_repeat, color_at, 0.0).rgb;
     let color = colors[min(id.x, arrayLength(&colors) - 1u)].rgb * texel;
-    let specular_at = map_coordinates(surface, uv, textureDimensions(specular_map));
-    let specular = surface.specular * textureSampleLevel(specular_map, linear_repeat, specular_at, 0.0).r;
+    let specular_at = map_coordinates(object, uv, textureDimensions(specular_map));
+    let specular = object.specular * textureSampleLevel(specular_map, linear_repeat, specular_at, 0.0).r;
     var total = transmitted_environment(environment, linear_wrap_u, n, point.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
@@ -47,5 +47,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
         total += transmitted(at, n, specular, lit, rho_dt_table);
     }
-    irradiance[id.x] = vec4f(color_before(surface, color) * total, 1.0);
+    irradiance[id.x] = vec4f(color_before(object, color) * total, 1.0);
 }

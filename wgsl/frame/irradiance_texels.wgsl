@@ -1,7 +1,7 @@
 // L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
 
 import package::units::{Number};
-import package::mesh::{Vertex, Surface, bent_normal, color_before, map_coordinates};
+import package::mesh::{Vertex, ObjectUniforms, bent_normal, color_before, map_coordinates};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::irradiance::{transmitted, transmitted_environment};
 import package::screen::{direction_to_eye};
@@ -13,7 +13,7 @@ struct Params {
     planes: array<vec4f, 6>,  // texels behind any of them are not lit
 }
 
-@group(0) @binding(0) var<uniform> surface: Surface;
+@group(0) @binding(0) var<uniform> object: ObjectUniforms;
 @group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 @group(0) @binding(3) var<storage, read> views: array<ShadowView>;
@@ -48,8 +48,8 @@ struct Texel {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
-    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
+    let n = object.object_to_world * vec4f(vertex.normal, 0.0);
     let clip = vec4f(vertex.atlas.x * 2.0 - 1.0, 1.0 - vertex.atlas.y * 2.0, 0.0, 1.0);
     let least_cosine = least_cosines[min(i, arrayLength(&least_cosines) - 1u)];
     let color = colors[min(i, arrayLength(&colors) - 1u)].rgb;
@@ -73,11 +73,11 @@ fn fs(in: Varying) -> Texel {
     let dy = dpdy(x);
     let n_s = normalize(in.normal);
     let wanted = is_wanted(x, n_s, in.least_cosine);
-    let normal_at = map_coordinates(surface, in.uv, textureDimensions(normal_map));
-    let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, normal_at).xyz, surface.normal_scale);
-    let specular_at = map_coordinates(surface, in.uv, textureDimensions(specular_map));
-    let specular = surface.specular * textureSample(specular_map, linear_repeat, specular_at).r;
-    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
+    let normal_at = map_coordinates(object, in.uv, textureDimensions(normal_map));
+    let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, normal_at).xyz, object.normal_scale);
+    let specular_at = map_coordinates(object, in.uv, textureDimensions(specular_map));
+    let specular = object.specular * textureSample(specular_map, linear_repeat, specular_at).r;
+    let color_at = map_coordinates(object, in.uv, textureDimensions(base_color_map));
     let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
     var irradiance = transmitted_environment(environment, linear_wrap_u, n, in.sky);
     for (var i = 0u; i < arrayLength(&lights); i++) {
@@ -99,5 +99,5 @@ fn fs(in: Varying) -> Texel {
     if !wanted {
         discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
     }
-    return Texel(vec4f(irradiance / params.unit * color_before(surface, color), 1.0));
+    return Texel(vec4f(irradiance / params.unit * color_before(object, color), 1.0));
 }

@@ -1,7 +1,7 @@
 // Light reflected at the surface of one object: the GGX lobe of each light, and the prefiltered environment.
 
 import package::units::{Number};
-import package::mesh::{Surface};
+import package::mesh::{ObjectUniforms};
 import package::light::{Light, ShadowView, incident, shadow, layer_towards};
 import package::ggx::{ggx_brdf};
 import package::rho_dt::{rho_dt};
@@ -19,8 +19,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var depth: texture_depth_2d;
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
@@ -43,8 +43,8 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    let seen = textureLoad(where_seen, texel, 0);
-    if u32(seen.z) != surface.id {
+    let seen = textureLoad(gbuffer_id, texel, 0);
+    if u32(seen.z) != object.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);

@@ -1,6 +1,6 @@
 // M where light leaves at the point that it entered: the profile's total times L_d.
 
-import package::mesh::{Surface, color_before, color_after};
+import package::mesh::{ObjectUniforms, color_before, color_after};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
@@ -10,8 +10,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var base_color: texture_2d<f32>;
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
 
@@ -27,10 +27,10 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let texel_color = textureLoad(base_color, texel, 0).rgb;
-    let color = color_before(surface, texel_color) * color_after(surface, texel_color);
+    let color = color_before(object, texel_color) * color_after(object, texel_color);
     return Pixel(vec4f(params.total * color * textureLoad(irradiance, texel, 0).rgb, 1.0));
 }

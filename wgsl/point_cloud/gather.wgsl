@@ -5,7 +5,7 @@
 // node stands for those below it where it is small enough for the nearest pixel. What is read for a node, which takes
 // longer than what is done with it, is read once for all.
 
-import package::mesh::{Surface, color_before, color_after};
+import package::mesh::{ObjectUniforms, color_before, color_after};
 import package::point_cloud::tree::{Entering};
 import package::screen::{position_of_pixel};
 import package::units::{Number, Position, Direction};
@@ -27,8 +27,8 @@ const BLOCK: u32 = 4u;       // of an invocation
 const NOWHERE: Number = 1e9; // mm: too far for light to get there
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var base_color: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
@@ -55,7 +55,7 @@ struct Sums {
 }
 
 fn is_seen(texel: vec2u) -> bool {
-    return all(texel < textureDimensions(where_seen)) && u32(textureLoad(where_seen, texel, 0).z) == surface.id;
+    return all(texel < textureDimensions(gbuffer_id)) && u32(textureLoad(gbuffer_id, texel, 0).z) == object.id;
 }
 
 fn corner_of(i: u32) -> vec2u {
@@ -64,7 +64,7 @@ fn corner_of(i: u32) -> vec2u {
 
 // The four pixels from `first` on. Where the object is not seen, x_o is nowhere.
 fn four(first: vec2u) -> Four {
-    let to_world = mat3x3f(surface.object_to_world[0].xyz, surface.object_to_world[1].xyz, surface.object_to_world[2].xyz);
+    let to_world = mat3x3f(object.object_to_world[0].xyz, object.object_to_world[1].xyz, object.object_to_world[2].xyz);
     var x: array<Position, 4>;
     var n: array<Direction, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -72,7 +72,7 @@ fn four(first: vec2u) -> Four {
         x[i] = vec3f(NOWHERE);
         if is_seen(texel) {
             let at = position_of_pixel(vec2f(texel) + 0.5, depth, params.clip_to_world);
-            x[i] = (at - surface.object_to_world[3].xyz) * to_world;
+            x[i] = (at - object.object_to_world[3].xyz) * to_world;
             n[i] = normalize(textureLoad(normal, texel, 0).xyz) * to_world;
         }
     }
@@ -131,9 +131,9 @@ fn store(first: vec2u, from_nodes: Sums) {
     for (var i = 0u; i < 4u; i++) {
         let texel = first + corner_of(i);
         let color = textureLoad(base_color, texel, 0).rgb;
-        let M = params.unit * sums.M[i] + params.near * color_before(surface, color) * textureLoad(irradiance, texel, 0).rgb;
+        let M = params.unit * sums.M[i] + params.near * color_before(object, color) * textureLoad(irradiance, texel, 0).rgb;
         let back = params.unit * sums.back[i];
-        let after = color_after(surface, color);
+        let after = color_after(object, color);
         if is_seen(texel) {
             textureStore(M_front, texel, vec4f((M - back) * after, 1.0));
             textureStore(M_back, texel, vec4f(back * after, 1.0));

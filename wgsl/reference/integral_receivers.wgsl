@@ -1,6 +1,6 @@
 // Where each pixel sees a surface: the face, and where on it.
 
-import package::mesh::{Vertex, Surface, color_after, map_coordinates};
+import package::mesh::{Vertex, ObjectUniforms, color_after, map_coordinates};
 import package::targets::{RGBA32Float};
 
 struct Params {
@@ -8,7 +8,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> corners: array<u32>; // vertices of the faces
 @group(0) @binding(4) var base_color_map: texture_2d<f32>;
@@ -31,7 +31,7 @@ struct Receivers {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[corners[i]];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
     let barycentric = vec2f(f32(i % 3u == 0u), f32(i % 3u == 1u));
     let color = colors[min(corners[i], arrayLength(&colors) - 1u)].rgb;
     return Varying(params.world_to_clip * x, barycentric, vec2f(vertex.u, vertex.v), i / 3u, color);
@@ -39,7 +39,7 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 
 @fragment
 fn fs(in: Varying) -> Receivers {
-    let color_at = map_coordinates(surface, in.uv, textureDimensions(base_color_map));
-    let color = color_after(surface, in.color * textureSample(base_color_map, linear_repeat, color_at).rgb);
-    return Receivers(vec4f(in.barycentric, f32(in.face), f32(surface.id)), vec4f(color, 1.0));
+    let color_at = map_coordinates(object, in.uv, textureDimensions(base_color_map));
+    let color = color_after(object, in.color * textureSample(base_color_map, linear_repeat, color_at).rgb);
+    return Receivers(vec4f(in.barycentric, f32(in.face), f32(object.id)), vec4f(color, 1.0));
 }

@@ -1,6 +1,6 @@
 // M_back at the pixels: that at the vertices, between them.
 
-import package::mesh::{Vertex, Surface, color_after};
+import package::mesh::{Vertex, ObjectUniforms, color_after};
 import package::screen::{is_hidden};
 import package::targets::{RGBA32Float};
 
@@ -9,10 +9,10 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> M_back_at: array<vec4f>; // by vertex of the welded topology
-@group(0) @binding(4) var where_seen: texture_2d<f32>;
+@group(0) @binding(4) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(5) var base_color: texture_2d<f32>;
 @group(0) @binding(6) var depth: texture_depth_2d;
 
@@ -28,15 +28,15 @@ struct Pixel {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
     return Varying(params.world_to_clip * x, M_back_at[vertex.welded].rgb);
 }
 
 @fragment
 fn fs(in: Varying) -> Pixel {
     let texel = vec2u(in.clip.xy);
-    if is_hidden(in.clip, depth) || u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if is_hidden(in.clip, depth) || u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
-    return Pixel(vec4f(in.M_back * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));
+    return Pixel(vec4f(in.M_back * color_after(object, textureLoad(base_color, texel, 0).rgb), 1.0));
 }

@@ -4,7 +4,7 @@
 // that faces. Weights are of whole pixels, by how many of them a millimetre of the surface spans there.
 
 import package::units::{Length, Number, Position};
-import package::mesh::{Surface, color_after};
+import package::mesh::{ObjectUniforms, color_after};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
@@ -23,7 +23,7 @@ struct Tap {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> taps: array<Tap>; // of each level, the one in the middle first
 @group(0) @binding(3) var source: texture_2d<f32>; // alpha: 1 - depth, 0 off the object
 @group(0) @binding(4) var slope: texture_2d<f32>;  // of the depth, per pixel to the right and down
@@ -113,7 +113,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if DIRECTION == 0u {
         return Pixel(vec4f(total, middle.a));
     }
-    let color = params.scale * color_after(surface, textureLoad(base_color, texel, 0).rgb);
+    let color = params.scale * color_after(object, textureLoad(base_color, texel, 0).rgb);
     let so_far = textureLoad(before, min(texel, vec2i(textureDimensions(before)) - 1), 0).rgb;
     return Pixel(vec4f(so_far + total * color, 1.0));
 }

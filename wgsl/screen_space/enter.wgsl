@@ -1,7 +1,7 @@
 // What enters one object at its pixels, and what arrives there from behind as if it did; and which way its surface runs
 // there: the input of the blurs.
 
-import package::mesh::{Surface, color_before};
+import package::mesh::{ObjectUniforms, color_before};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float, RG32Float};
 
@@ -11,8 +11,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var base_color: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
@@ -34,7 +34,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let here = textureLoad(depth, texel, 0);
@@ -48,7 +48,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     // Steps on the plane through x are those that the normal is at right angles to.
     let facing = min(dot(n, away), -LEAST_COSINE * length(away));
     let slope = -vec2f(dot(n, right.xyz - x * right.w), dot(n, down.xyz - x * down.w)) / facing;
-    let color = color_before(surface, textureLoad(base_color, texel, 0).rgb);
+    let color = color_before(object, textureLoad(base_color, texel, 0).rgb);
     let arriving = textureLoad(behind, min(texel, textureDimensions(behind) - 1u), 0).rgb;
     return Pixel(vec4f((textureLoad(irradiance, texel, 0).rgb + arriving) * color, 1.0 - here), slope);
 }

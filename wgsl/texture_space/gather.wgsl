@@ -1,7 +1,7 @@
 // M_front of one object at its pixels: its irradiance maps, each blurred by one Gaussian, summed by weight
 // (Mikkelsen 2009, 3.4, step 4a).
 
-import package::mesh::{Surface, color_after};
+import package::mesh::{ObjectUniforms, color_after};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
@@ -11,8 +11,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var base_color: texture_2d<f32>;
 @group(0) @binding(4) var linear_clamp: sampler;
 @group(0) @binding(5) var blurred_0: texture_2d<f32>;
@@ -56,8 +56,8 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    let seen = textureLoad(where_seen, texel, 0);
-    if u32(seen.z) != surface.id {
+    let seen = textureLoad(gbuffer_id, texel, 0);
+    if u32(seen.z) != object.id {
         discard;
     }
     let uv = seen.xy;
@@ -67,5 +67,5 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     M += params.weights[3].rgb * smooth_sample(blurred_3, linear_clamp, uv);
     M += params.weights[4].rgb * smooth_sample(blurred_4, linear_clamp, uv);
     M += params.weights[5].rgb * smooth_sample(blurred_5, linear_clamp, uv);
-    return Pixel(vec4f(M * color_after(surface, textureLoad(base_color, texel, 0).rgb), 1.0));
+    return Pixel(vec4f(M * color_after(object, textureLoad(base_color, texel, 0).rgb), 1.0));
 }

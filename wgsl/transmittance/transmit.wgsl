@@ -2,7 +2,7 @@
 // Real-Time Realistic Skin Translucency).
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
-import package::mesh::{Surface};
+import package::mesh::{ObjectUniforms};
 import package::light::{Light, ShadowView, Incident, incident, layer_towards, POINT};
 import package::rho_dt::{rho_dt};
 import package::screen::{position_of_pixel};
@@ -17,9 +17,9 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> through: array<vec3f>; // T over the profile's total, by the square root of the thickness
-@group(0) @binding(3) var where_seen: texture_2d<f32>;
+@group(0) @binding(3) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(4) var normal: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
 @group(0) @binding(6) var<storage, read> lights: array<Light>;
@@ -103,7 +103,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);

@@ -1,6 +1,6 @@
 // Colours at the vertices of one object, between them at its pixels.
 
-import package::mesh::{Vertex, Surface};
+import package::mesh::{Vertex, ObjectUniforms};
 import package::targets::{RGBA8UnormSrgb};
 
 struct Params {
@@ -8,7 +8,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> colors: array<vec4f>; // by vertex, linear
 
@@ -23,7 +23,7 @@ struct Pixel {
 
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
-    let x = surface.object_to_world * vec4f(vertices[i].position, 1.0);
+    let x = object.object_to_world * vec4f(vertices[i].position, 1.0);
     return Varying(params.world_to_clip * x, colors[i].rgb);
 }
 

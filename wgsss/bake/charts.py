@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.seams import apply, find_seams
 from wgsss.bake.stretch import stretch
-from wgsss.bake.unwrap import Surface, atlas_vertices
+from wgsss.bake.unwrap import RenderMesh, atlas_vertices
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.scene.mesh import Mesh
@@ -42,12 +42,19 @@ class Charts:
     """array<Seam> (wgsl/charts.wgsl)"""
 
 
-def charts(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Charts:
-    """The charts of `surface`, the render mesh of `mesh`, on maps of `size` x `size` texels; cached."""
-    key: list[KeyPart] = [mesh.positions, surface.vertex, surface.atlas, surface.faces, surface.charts, size]
+def charts(gpu: Gpu, mesh: Mesh, render_mesh: RenderMesh, size: int) -> Charts:
+    """The charts of `render_mesh`, the render mesh of `mesh`, on maps of `size` x `size` texels; cached."""
+    key: list[KeyPart] = [
+        mesh.positions,
+        render_mesh.vertex,
+        render_mesh.atlas,
+        render_mesh.faces,
+        render_mesh.charts,
+        size,
+    ]
 
     def make() -> Arrays:
-        return _make(gpu, mesh, surface, size)
+        return _make(gpu, mesh, render_mesh, size)
 
     code = [find_seams, stretch, atlas_vertices, "bake/charts", "bake/gutter"]
     label = f"mapping {len(mesh.faces)} faces to {size} x {size} texels"
@@ -63,11 +70,11 @@ def charts(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Charts:
     )
 
 
-def _make(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Arrays:
-    stretched = stretch(mesh, surface)
-    seams = find_seams(surface, stretched.root)
+def _make(gpu: Gpu, mesh: Mesh, render_mesh: RenderMesh, size: int) -> Arrays:
+    stretched = stretch(mesh, render_mesh)
+    seams = find_seams(render_mesh, stretched.root)
     vertices = {
-        "atlas": surface.atlas,
+        "atlas": render_mesh.atlas,
         "root": np.minimum(stretched.root[:, [0, 0, 1], [0, 1, 1]], _FLOAT16_MAX / size),
         "along_u": stretched.axes[:, 0],
         "along_v": stretched.axes[:, 1],
@@ -78,11 +85,11 @@ def _make(gpu: Gpu, mesh: Mesh, surface: Surface, size: int) -> Arrays:
         "bake/charts",
         size=(size, size),
         depth_buffer="new",
-        count=surface.faces.size,
+        count=render_mesh.faces.size,
         params=params,
         vertices=vertices,
-        faces=gpu.buffer(surface.faces),
-        face_charts=gpu.buffer(surface.charts),
+        faces=gpu.buffer(render_mesh.faces),
+        face_charts=gpu.buffer(render_mesh.charts),
     )
     ids = drawn.ids
     if len(seams.maps):

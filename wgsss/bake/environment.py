@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import KeyPart, cached
 from wgsss.bake.suns import Sun, take_suns
+from wgsss.cache import KeyPart, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph, Handle
 from wgsss.scene import DirectionalLight, EnvironmentLight, Material

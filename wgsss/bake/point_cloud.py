@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.octree import Octree, morton, octree
 from wgsss.bake.samples import Samples, count, subdivided
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.errors import InputError, Note
 from wgsss.scene.mesh import Mesh
 

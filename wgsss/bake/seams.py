@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.unwrap import Surface, atlas_vertices
+from wgsss.bake.unwrap import RenderMesh, atlas_vertices
 
 Array = npt.NDArray[Any]
 
@@ -27,21 +27,21 @@ class Seams:
     """int32 (N,): the chart that each is a border of"""
 
 
-def find_seams(surface: Surface, roots: Array) -> Seams:
+def find_seams(render_mesh: RenderMesh, roots: Array) -> Seams:
     """The seams of a surface. `roots` (R, 2, 2) are those of its stretch.
 
     The map takes the edge to the same edge of the neighbouring triangle, and a step perpendicular to it on the surface
     to the step of the same length in mm that continues it. At open edges of the mesh it is the reflection about the
     edge, as measured on the surface: what is constant stays constant, and nothing flows out.
     """
-    atlas = surface.atlas.astype(np.float64)
-    start = surface.faces.reshape(-1)  # half-edge 3 f + k goes from corner k of face f to the next one
-    end, third = surface.faces[:, [1, 2, 0]].reshape(-1), surface.faces[:, [2, 0, 1]].reshape(-1)
-    has_area = np.abs(np.linalg.det(atlas[surface.faces[:, 1:]] - atlas[surface.faces[:, :1]])) > 1e-14
-    usable = np.repeat(has_area, 3) & (surface.vertex[start] != surface.vertex[end])
-    point = atlas_vertices(surface.vertex, surface.atlas)
+    atlas = render_mesh.atlas.astype(np.float64)
+    start = render_mesh.faces.reshape(-1)  # half-edge 3 f + k goes from corner k of face f to the next one
+    end, third = render_mesh.faces[:, [1, 2, 0]].reshape(-1), render_mesh.faces[:, [2, 0, 1]].reshape(-1)
+    has_area = np.abs(np.linalg.det(atlas[render_mesh.faces[:, 1:]] - atlas[render_mesh.faces[:, :1]])) > 1e-14
+    usable = np.repeat(has_area, 3) & (render_mesh.vertex[start] != render_mesh.vertex[end])
+    point = atlas_vertices(render_mesh.vertex, render_mesh.atlas)
     inside = _others(point[start], point[end], usable)
-    other = _others(surface.vertex[start], surface.vertex[end], usable)
+    other = _others(render_mesh.vertex[start], render_mesh.vertex[end], usable)
 
     border = np.flatnonzero(usable & (inside < 0))
     i, j = start[border], end[border]
@@ -52,7 +52,7 @@ def find_seams(surface: Surface, roots: Array) -> Seams:
     beyond = other[border]
     open_edge = beyond < 0
     beyond = np.where(open_edge, border, beyond)
-    same_way = surface.vertex[start[beyond]] == surface.vertex[i]
+    same_way = render_mesh.vertex[start[beyond]] == render_mesh.vertex[i]
     k, m = np.where(same_way, start[beyond], end[beyond]), np.where(same_way, end[beyond], start[beyond])
     edge_beyond = atlas[m] - atlas[k]
     step_beyond, _ = _perpendicular(edge_beyond, atlas[third[beyond]] - atlas[k], (roots[k] + roots[m]) / 2)
@@ -62,7 +62,7 @@ def find_seams(surface: Surface, roots: Array) -> Seams:
         np.stack([atlas[i], atlas[j]], axis=1),
         -side,
         np.concatenate([A, t[..., None]], axis=-1),
-        surface.charts[border // 3],
+        render_mesh.charts[border // 3],
     )
 
 

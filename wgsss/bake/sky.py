@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake import rays
-from wgsss.bake.cache import cached
 from wgsss.bake.environment import divided
 from wgsss.bake.suns import solid_angles
+from wgsss.cache import cached
 from wgsss.scene import EnvironmentLight, Scene
 
 Array = npt.NDArray[Any]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.unwrap import Surface, atlas_vertices
+from wgsss.bake.unwrap import RenderMesh, atlas_vertices
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -29,19 +29,19 @@ class Stretch:
     """float64 (R, 2, 3): means over the faces around, so that they are to be made orthonormal again where these bend"""
 
 
-def stretch(mesh: Mesh, surface: Surface) -> Stretch:
+def stretch(mesh: Mesh, render_mesh: RenderMesh) -> Stretch:
     """The stretch at the render vertices: means over the faces around, weighted by area.
 
     Roots are averaged rather than inverse metrics, since area times root stays bounded where a face degenerates; and
     apart from the axes, since the mean of gradients over a bent surface is too short.
     """
-    gradients, areas = face_gradients(mesh, surface)
+    gradients, areas = face_gradients(mesh, render_mesh)
     roots = _root(gradients @ gradients.transpose(0, 2, 1))
     sound = np.linalg.det(roots) > 0
     areas = np.where(sound, areas, 0)
     axes = np.linalg.solve(np.where(sound[:, None, None], roots, np.eye(2)), gradients)
-    point = atlas_vertices(surface.vertex, surface.atlas)
-    corner = point[surface.faces].reshape(-1)
+    point = atlas_vertices(render_mesh.vertex, render_mesh.atlas)
+    corner = point[render_mesh.faces].reshape(-1)
     count = int(point.max()) + 1
     weight = np.bincount(corner, np.repeat(areas, 3), count)
 
@@ -56,11 +56,11 @@ def stretch(mesh: Mesh, surface: Surface) -> Stretch:
     return Stretch(root[point], mean(axes)[point])
 
 
-def face_gradients(mesh: Mesh, surface: Surface) -> tuple[Array, Array]:
+def face_gradients(mesh: Mesh, render_mesh: RenderMesh) -> tuple[Array, Array]:
     """float64 (F, 2, 3): the gradients of u and v over each face, uv per mm, zero for faces without an area; and their
     areas (F,), mm^2. They are the rows of the pseudo-inverse of [sigma_s sigma_t]."""
     corners = mesh.positions.astype(np.float64)[mesh.faces]
-    texture = surface.atlas.astype(np.float64)[surface.faces]
+    texture = render_mesh.atlas.astype(np.float64)[render_mesh.faces]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(first, second)
     area = np.linalg.norm(normal, axis=1)  # twice the triangle's

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake import rays
-from wgsss.bake.cache import cached
+from wgsss.cache import cached
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 

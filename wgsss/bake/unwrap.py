@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.atlas import library, new_atlas
-from wgsss.bake.cache import Arrays, cached
+from wgsss.cache import Arrays, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.scene.mesh import Mesh
@@ -25,7 +25,7 @@ MARGIN = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class RenderMesh:
     """The render mesh: the mesh's vertices, split where texture coordinates, normals or colours differ."""
 
     vertex: Array
@@ -44,7 +44,7 @@ class Surface:
     """int32 (F,), the connected piece of the atlas that a face is in, 0..C-1"""
 
 
-def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
+def unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
     """The render mesh of `mesh`, cached. Its own texture coordinates are the atlas where they are unique, else a
     new one is made: see `atlas.py`.
 
@@ -53,35 +53,35 @@ def unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
     key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors, library()]
 
     def make() -> Arrays:
-        surface = _unwrap(gpu, mesh)
-        return {f.name: getattr(surface, f.name) for f in fields(Surface)}
+        render_mesh = _unwrap(gpu, mesh)
+        return {f.name: getattr(render_mesh, f.name) for f in fields(RenderMesh)}
 
     label = f"unwrapping {len(mesh.faces)} faces"
-    return Surface(**cached("unwrap", key, make, code=[Mesh, new_atlas, "bake/atlas_faces"], label=label))
+    return RenderMesh(**cached("unwrap", key, make, code=[Mesh, new_atlas, "bake/atlas_faces"], label=label))
 
 
-def split(mesh: Mesh) -> Surface:
+def split(mesh: Mesh) -> RenderMesh:
     """The render mesh of `mesh` without an atlas, for passes that need none: `atlas` and `charts` are zero."""
     return _render_mesh(mesh, None)
 
 
-def _unwrap(gpu: Gpu, mesh: Mesh) -> Surface:
+def _unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
     atlas = None if mesh.corner_uvs is None else _fitted(mesh.corner_uvs)
     if atlas is None or not is_unique(gpu, mesh, atlas):
         atlas = new_atlas(mesh)
-    surface = _render_mesh(mesh, atlas)
-    charts = _components(atlas_vertices(surface.vertex, surface.atlas)[surface.faces])
-    return replace(surface, charts=charts)
+    render_mesh = _render_mesh(mesh, atlas)
+    charts = _components(atlas_vertices(render_mesh.vertex, render_mesh.atlas)[render_mesh.faces])
+    return replace(render_mesh, charts=charts)
 
 
-def _render_mesh(mesh: Mesh, atlas: Array | None) -> Surface:
+def _render_mesh(mesh: Mesh, atlas: Array | None) -> RenderMesh:
     """The mesh split where what corners carry differs: the atlas (F, 3, 2), the mesh's own uvs, normals, colours."""
     carried = (atlas, mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors)
     corners = [a.reshape(-1, a.shape[-1]) for a in carried if a is not None]
     first, index = _distinct([mesh.faces.reshape(-1, 1), *corners])
     vertex = mesh.faces.reshape(-1)[first]
     none, white = np.zeros((len(first), 2), np.float32), np.ones((len(first), 3), np.float32)
-    return Surface(
+    return RenderMesh(
         vertex=vertex,
         normals=mesh.shading_normals.reshape(-1, 3)[first],
         atlas=none if atlas is None else atlas.reshape(-1, 2)[first],

@@ -16,7 +16,7 @@ def declare(commands: Any) -> None:
 
 
 def run(args: Any) -> None:
-    from wgsss.bake import cache
+    from wgsss import cache
     from wgsss.gpu import default_gpu
     from wgsss.stage import Stage
 

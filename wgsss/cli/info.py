@@ -39,8 +39,7 @@ def _about_this_machine(args: Any) -> None:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    from wgsss import __version__
-    from wgsss.bake import cache
+    from wgsss import __version__, cache
     from wgsss.gpu import LIMITS, adapters, default_gpu
 
     versions = {"wgsss": __version__, "python": platform.python_version()}

@@ -9,7 +9,6 @@ from dataclasses import fields
 from typing import Any
 
 from wgsss.errors import InputError, unknown
-from wgsss.methods.jimenez08 import SeenTextureSpace
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.local_thickness import LocalThickness
 from wgsss.methods.method import Diffused, Method
@@ -20,6 +19,7 @@ from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps
 from wgsss.methods.transmittance import Transmittance
+from wgsss.methods.visible_texture_space import VisibleTextureSpace
 from wgsss.text import shown
 
 TRANSLUCENCIES: dict[str, type[Translucency]] = {
@@ -33,7 +33,7 @@ TRANSLUCENCIES: dict[str, type[Translucency]] = {
 METHODS: dict[str, type[Method]] = {
     "lambert": Lambert,
     "deon07": pair(TextureSpace, TranslucentShadowMaps),
-    "jimenez08": SeenTextureSpace,
+    "jimenez08": VisibleTextureSpace,
     "jimenez15": pair(ScreenSpace, Transmittance),
     "barre11": pair(Lambert, LocalThickness),
     "jensen02": PointCloud,

@@ -31,8 +31,8 @@ class Lambert:
                 size=frame.size,
                 count=6,
                 params={"total": body.material.profile.total, "rectangle": shared.rectangle(frame, body)},
-                surface=body.surface,
+                object=body.object_uniforms,
                 irradiance=irradiance,
-                **frame.seen("where_seen", "base_color"),
+                **frame.gbuffer_bindings("gbuffer_id", "base_color"),
             )
         return Diffused(M_front)

@@ -126,7 +126,7 @@ class LocalThickness:
         M_back: Any = None
         for body, thickness in shown.items():
             M_back = frame.graph.draw(
-                "thickness/forward",
+                "local_thickness/forward",
                 into=M_back,
                 size=frame.size,
                 indices=body.indices,
@@ -147,21 +147,21 @@ class LocalThickness:
         stored: Any = None
         for body, thickness in shown.items():
             stored = frame.graph.draw(
-                "thickness/gbuffer",
+                "local_thickness/gbuffer",
                 into=stored,
                 size=frame.size,
                 indices=body.indices,
                 constants=constants,
                 params={"world_to_clip": frame.view.world_to_clip, "which": sets.index(self._transport(body))},
-                surface=body.surface,
+                object=body.object_uniforms,
                 vertices=body.vertices,
                 thickness=thickness,
-                **frame.seen("depth"),
+                **frame.gbuffer_bindings("depth"),
             )
         M_back: Any = None
         for body in shown:
             M_back = frame.graph.draw(
-                "thickness/deferred",
+                "local_thickness/deferred",
                 into=M_back,
                 size=frame.size,
                 count=6,
@@ -173,7 +173,7 @@ class LocalThickness:
                 },
                 transports=sets,
                 stored=stored,
-                **frame.seen("where_seen", "normal"),
+                **frame.gbuffer_bindings("gbuffer_id", "normal"),
                 **_lit(frame, body),
             )
         return M_back
@@ -195,10 +195,10 @@ class LocalThickness:
 
 def _lit(frame: Frame, body: Body) -> dict[str, Any]:
     return {
-        "surface": body.surface,
+        "object": body.object_uniforms,
         "lights": frame.lighting.lights,
         "environment": body.environment.irradiance,
-        **frame.seen("base_color", "depth"),
+        **frame.gbuffer_bindings("base_color", "depth"),
     }
 
 

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from wgsss import frame as shared
 from wgsss import wgsl
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.point_cloud import PointCloud as Cloud
 from wgsss.bake.point_cloud import point_cloud
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
@@ -100,12 +100,12 @@ class PointCloud:
                     "first_entry": kernel.first,
                 },
                 constants={"FIRST": body.index == 0},
-                surface=body.surface,
+                object=body.object_uniforms,
                 irradiance=irradiance,
                 table=self._table(body),
                 entering=self._entering(frame, body),
                 **M,
-                **frame.seen("where_seen", "normal", "base_color", "depth"),
+                **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
             )
             M = vars(gathered)
         return Diffused(M["M_front"], M["M_back"])

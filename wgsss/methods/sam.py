@@ -77,10 +77,10 @@ class Adjacency:
                 size=frame.size,
                 indices=plan.faces,
                 params={"world_to_clip": frame.view.world_to_clip},
-                surface=body.surface,
+                object=body.object_uniforms,
                 vertices=body.vertices,
                 M_back_at=self.at_vertices(frame, body, plan),
-                **frame.seen("where_seen", "base_color", "depth"),
+                **frame.gbuffer_bindings("gbuffer_id", "base_color", "depth"),
             )
         return M_back
 
@@ -89,7 +89,7 @@ class Adjacency:
         entries, stage, mesh = self.map(body), body.stage, body.rest.mesh
         moving = body.rest.motion is not None
         key = ("plan", id(entries), body.index if moving else None)
-        return stage.shared(key, lambda: make_plan(stage.gpu, mesh, body.layout.faces, entries, moving=moving))
+        return stage.shared(key, lambda: make_plan(stage.gpu, mesh, body.render_mesh.faces, entries, moving=moving))
 
     def at_vertices(self, frame: Frame, body: Body, plan: Plan) -> Handle:
         """M_back, W/m^2, at the vertices of a body's mesh, without what `color_after` leaves of the base colour."""

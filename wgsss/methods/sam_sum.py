@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import frame as shared
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.rows import ORDER, near_pairs
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.frame import Frame
 from wgsss.graph import Graph, Handle
 from wgsss.methods.sam_motion import deforming, posed

@@ -98,11 +98,11 @@ class ScreenSpace:
             "screen_space/enter",
             size=frame.size,
             count=6,
-            surface=body.surface,
+            object=body.object_uniforms,
             params=where,
             irradiance=irradiance,
             behind=behind or frame.stage.gpu.black,
-            **frame.seen("where_seen", "normal", "base_color", "depth"),
+            **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
         )
         terms = self.weights(body, self.taps or taps_for(frame, body))
         M: Any = frame.stage.gpu.black
@@ -121,12 +121,12 @@ class ScreenSpace:
                         **where,
                     },
                     constants={"DIRECTION": direction},
-                    surface=body.surface,
+                    object=body.object_uniforms,
                     taps=buffer,
                     source=M,
                     slope=entered.slope,
                     before=before,
-                    **frame.seen("base_color"),
+                    **frame.gbuffer_bindings("base_color"),
                 )
         return M
 

@@ -98,9 +98,9 @@ class TextureSpace:
             size=frame.size,
             count=6,
             params={"weights": weights, "rectangle": rectangle(frame, body)},
-            surface=body.surface,
+            object=body.object_uniforms,
             **by_slot(maps),
-            **frame.seen("where_seen", "base_color"),
+            **frame.gbuffer_bindings("gbuffer_id", "base_color"),
         )
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:

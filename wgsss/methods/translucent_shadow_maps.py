@@ -94,9 +94,9 @@ def _through(
         gaussians[: len(blurred), :3] = profile.weights * frame.lighting.unit
         gaussians[: len(blurred), 3] = profile.variances
         seen = _seen_from(light, body)
-        where = _meet(frame, body, seen.views)
+        where = _first_hit(frame, body, seen.views)
         M_back = frame.graph.draw(
-            "tsm/transmit",
+            "translucent_shadow_maps/transmit",
             into=M_back,
             size=frame.size,
             count=6,
@@ -107,14 +107,14 @@ def _through(
                 "rectangle": rectangle(frame, body),
                 "gaussians": gaussians,
             },
-            surface=body.surface,
+            object=body.object_uniforms,
             views=seen.views,
             entry=where.x_i,
             entry_normal=where.n_i,
             entry_atlas=where.atlas,
             so_far=so_far or stage.gpu.black,
             **by_slot(blurred),
-            **frame.seen("where_seen", "normal", "base_color", "depth"),
+            **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
         )
     return M_back
 
@@ -128,22 +128,22 @@ def _seen_from(light: Source, body: Body) -> SimpleNamespace:
     return SimpleNamespace(views=emitters([centre], points).views, light=(*light.position, 1.0))
 
 
-def _meet(frame: Frame, body: Body, views: list[dict[str, Any]]) -> SimpleNamespace:
-    """Where the rays of each view first meet a body: the outputs of wgsl/tsm/meet.wgsl, a layer for each."""
+def _first_hit(frame: Frame, body: Body, views: list[dict[str, Any]]) -> SimpleNamespace:
+    """Draw where the rays of each view first hit a body: the outputs of `first_hit.wgsl`, one layer for each view."""
     side, layers = SIDE[len(views)], len(views)
     formats = {"x_i": "rgba32float", "n_i": "rgba16float", "atlas": "rg32float", "depth": "depth32float"}
     made = {name: frame.graph.texture(name, (side, side, layers), kind) for name, kind in formats.items()}
     for layer, view in enumerate(views):
         depth = made.pop("depth")
         drawn = frame.graph.draw(
-            "tsm/meet",
+            "translucent_shadow_maps/first_hit",
             size=(side, side),
             indices=body.indices,
             into=made,
             depth_buffer=depth,
             layer=layer,
             params={"world_to_clip": view["world_to_clip"]},
-            surface=body.surface,
+            object=body.object_uniforms,
             vertices=body.vertices,
         )
         made = vars(drawn)

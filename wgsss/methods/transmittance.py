@@ -84,9 +84,9 @@ class Transmittance:
                 count=6,
                 label="back",
                 params={"total": body.material.profile.total, "rectangle": rectangle(frame, body)},
-                surface=body.surface,
+                object=body.object_uniforms,
                 irradiance=arriving,
-                **frame.seen("where_seen", "base_color"),
+                **frame.gbuffer_bindings("gbuffer_id", "base_color"),
             )
         return M_back
 
@@ -115,7 +115,7 @@ class Transmittance:
                 count=6,
                 params={**lengths, **where},
                 through=through,
-                **frame.seen("where_seen", "normal", "depth"),
+                **frame.gbuffer_bindings("gbuffer_id", "normal", "depth"),
                 **frame.light_bindings(body),
             )
         return arriving

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.environment import prefilter
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
 from wgsss.bake.suns import take_suns
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.emitters import emitters
 from wgsss.errors import Note
 from wgsss.frame import Frame, begin
@@ -159,7 +159,7 @@ def _seen(frame: Frame) -> Any:
             depth_buffer="new" if drawn is None else drawn.depth,
             into=kept,
             params={"world_to_clip": frame.view.world_to_clip},
-            surface=body.surface,
+            object=body.object_uniforms,
             vertices=body.vertices,
             corners=body.indices,
             colors=body.colors,

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import cached
+from wgsss.cache import cached
 from wgsss.errors import InputError, Note, RenderError
 from wgsss.reference import mitsuba_render, mitsuba_scene
 from wgsss.reference.mitsuba_xml import described

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.cache import KeyPart, cached
 from wgsss.bake.octree import morton
+from wgsss.cache import KeyPart, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.reference.kernel import Kernel

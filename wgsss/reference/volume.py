@@ -85,8 +85,8 @@ class _Pixels:
         graph = Graph(stage.gpu)
         frame = begin(graph, stage, size)
         tables = {key: table for key, table in frame.rho_dt.items()}
-        graph.run(frame.gbuffer.where_seen, frame.gbuffer.normal, *tables.values())
-        body = graph.read(frame.gbuffer.where_seen)[..., 2].astype(int)
+        graph.run(frame.gbuffer.gbuffer_id, frame.gbuffer.normal, *tables.values())
+        body = graph.read(frame.gbuffer.gbuffer_id)[..., 2].astype(int)
         self._seen = body > 0
         body = body[self._seen] - 1
         normal = graph.read(frame.gbuffer.normal)[self._seen].astype(np.float64)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import wgsss
-from wgsss.bake import cache
+from wgsss import cache
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import default_gpu
 from wgsss.methods import make_method

@@ -33,7 +33,7 @@ def _stretch(body: Body) -> Array:
 
 def _thickness(body: Body) -> Array:
     """(R, 3) by render vertex: white is thin."""
-    return local_thickness(body.rest.mesh, body.material.profile)[body.layout.vertex]
+    return local_thickness(body.rest.mesh, body.material.profile)[body.render_mesh.vertex]
 
 
 _PAINTED: dict[str, Callable[[Body], Array]] = {"UV stretch": _stretch, "thickness": _thickness}
@@ -61,7 +61,7 @@ def scene_layer(frame: Frame, layer: str) -> Handle | None:
             into={} if drawn is None else {"display": drawn.display},
             depth_buffer="new" if drawn is None else drawn.depth,
             params={"world_to_clip": frame.view.world_to_clip},
-            surface=body.surface,
+            object=body.object_uniforms,
             vertices=body.vertices,
             colors=colors,
         )

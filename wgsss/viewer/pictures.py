@@ -42,16 +42,16 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A frame by several methods: a picture for each; what they are of is at `where_seen`, as of the g-buffer."""
+    """A frame by several methods: a picture for each; what they are of is at `gbuffer_id`, as of the g-buffer."""
 
     graph: Graph
-    where_seen: Handle
+    gbuffer_id: Handle
     pictures: list[Picture]
 
     @property
     def seen(self) -> Array:
         """bool (H, W): where something is."""
-        found: Array = self.graph.read(self.where_seen)[..., 2] > 0.0
+        found: Array = self.graph.read(self.gbuffer_id)[..., 2] > 0.0
         return found
 
     def M(self, picture: Picture) -> Array:
@@ -110,7 +110,7 @@ class Easel:
                 display = light and shared.tone_map(graph, light, scene.exposure, scene.tone_map)
             passes = tuple(item.name for item in graph.needed(*([display] if display else []), *drawn.M))
             found.append(Picture(display, drawn.M, passes))
-        seen = frame.gbuffer.where_seen
+        seen = frame.gbuffer.gbuffer_id
         shadows = frame.lighting.shadow_maps
         wanted = [seen, *(h for p in found for h in (p.display, *p.M) if h is not None)]
         wanted += [shadows] if isinstance(shadows, Handle) else []

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.bake.cache import Arrays, KeyPart, cached
 from wgsss.bake.rays import Caster
 from wgsss.bake.sam.blend import blend
 from wgsss.bake.sam.blocks import Blocks
@@ -31,6 +30,7 @@ from wgsss.bake.sam.soundness import concerns
 from wgsss.bake.sam.top import best, select_top
 from wgsss.bake.sam.training import training
 from wgsss.bake.sam.tree import tree
+from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.errors import InputError, Note, unknown
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import Arrays
 from wgsss.bake.sam.blend import Blend
 from wgsss.bake.sam.mix import MIX_BYTES, Mix
 from wgsss.bake.sam.tree import Tree
 from wgsss.bake.samples import Samples
+from wgsss.cache import Arrays
 
 Array = npt.NDArray[Any]
 

@@ -1,8 +1,8 @@
 // The target of a g-buffer of 8 bits a channel that holds one object's translucency.
 
-import package::mesh::{Vertex, Surface};
+import package::mesh::{Vertex, ObjectUniforms};
 import package::screen::{is_hidden};
-import package::thickness::packing::{pack_grey, pack_coloured};
+import package::local_thickness::packing::{pack_grey, pack_coloured};
 import package::targets::{RGBA8Unorm};
 
 override COLOURED: bool = true;
@@ -14,7 +14,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
 @group(0) @binding(4) var depth: texture_depth_2d;
@@ -31,7 +31,7 @@ struct Pixel {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
     return Varying(params.world_to_clip * x, thickness[vertex.welded].rgb);
 }
 

@@ -1,11 +1,11 @@
 // M_back at the pixels of one object, from the thickness that a g-buffer has.
 
-import package::mesh::{Surface};
+import package::mesh::{ObjectUniforms};
 import package::light::{Light, incident};
 import package::irradiance::{transmitted_environment};
 import package::screen::{position_of_pixel, direction_to_eye};
-import package::thickness::packing::{unpack_grey, unpack_coloured, unpack_low};
-import package::thickness::transport::{Transport, let_out, let_out_environment};
+import package::local_thickness::packing::{unpack_grey, unpack_coloured, unpack_low};
+import package::local_thickness::transport::{Transport, let_out, let_out_environment};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
@@ -21,11 +21,11 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> transports: array<Transport>; // that materials have
-@group(0) @binding(2) var<uniform> surface: Surface;
+@group(0) @binding(2) var<uniform> object: ObjectUniforms;
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 @group(0) @binding(4) var environment: texture_2d<f32>;
 @group(0) @binding(5) var linear_wrap_u: sampler;
-@group(0) @binding(6) var where_seen: texture_2d<f32>;
+@group(0) @binding(6) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(7) var normal: texture_2d<f32>;
 @group(0) @binding(8) var base_color: texture_2d<f32>;
 @group(0) @binding(9) var depth: texture_depth_2d;
@@ -43,7 +43,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);

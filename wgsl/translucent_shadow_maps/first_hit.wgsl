@@ -1,7 +1,7 @@
 // A translucent shadow map: where a light's rays first meet one object, in space and in its atlas, and the normal there
 // (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009, 3.4).
 
-import package::mesh::{Vertex, Surface};
+import package::mesh::{Vertex, ObjectUniforms};
 import package::targets::{RGBA32Float, RG32Float, RGBA16Float};
 
 struct Params {
@@ -9,7 +9,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 
 struct Varying {
@@ -28,8 +28,8 @@ struct Texel {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = surface.object_to_world * vec4f(vertex.position, 1.0);
-    let n = surface.object_to_world * vec4f(vertex.normal, 0.0);
+    let x = object.object_to_world * vec4f(vertex.position, 1.0);
+    let n = object.object_to_world * vec4f(vertex.normal, 0.0);
     return Varying(params.world_to_clip * x, x.xyz, n.xyz, vertex.atlas);
 }
 

@@ -14,8 +14,8 @@ from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.graph import Graph
 from wgsss.methods import make_method, texture_space
-from wgsss.methods.jimenez08 import SeenTextureSpace, is_closed
 from wgsss.methods.texture_space import TextureSpace
+from wgsss.methods.visible_texture_space import VisibleTextureSpace, is_closed
 from wgsss.optics import SKIN_GAUSSIANS
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, Mesh, Object, OrthographicCamera, PerspectiveCamera
@@ -52,7 +52,7 @@ def lit_texels(gpu, scene, size, **limits):
     frame = shared.begin(graph, stage, (96, 64))
     handle = shared.irradiance_texels(frame, stage.bodies[0], size, **limits)
     graph.run(handle)
-    return graph.read(handle)[..., 3] > 0, stage.bodies[0].layout
+    return graph.read(handle)[..., 3] > 0, stage.bodies[0].render_mesh
 
 
 def octahedron(radius=20.0):
@@ -108,7 +108,7 @@ def test_what_is_left_out_is_not_missed(gpu, shape, switch):
     behind = DirectionalLight((-0.3, 0.1, 0.9), (2, 2, 2))
     scene = lit(SIDE, behind, mesh=mesh, material=SKIN, camera=camera)
     whole = picture(gpu, scene, TextureSpace(map_size=256))
-    some = picture(gpu, scene, SeenTextureSpace(map_size=256, **only(switch)))
+    some = picture(gpu, scene, VisibleTextureSpace(map_size=256, **only(switch)))
     off = np.abs(some.display.astype(int) - whole.display)
     assert off.max() <= 1
     assert len(np.unique(some.display)) > 50
@@ -119,7 +119,7 @@ def test_on_what_bends_little_the_limit_is_105_degrees(gpu):
     for radius in (40.0, 20.0, 10.0):
         angle = max(105.0, 90 + math.degrees(2 * math.asin(3 * math.sqrt(7.41) / (2 * radius))))
         stage = Stage(gpu, lit(SIDE, mesh=sphere(radius, 2000), material=SKIN, camera=FRONT))
-        buffer = SeenTextureSpace().least_cosines(stage.bodies[0])
+        buffer = VisibleTextureSpace().least_cosines(stage.bodies[0])
         cosines = np.frombuffer(gpu.queue.read_buffer(buffer), np.float32)
         np.testing.assert_allclose(np.degrees(np.arccos(cosines)), angle, atol=0.01 if angle == 105 else 2)
 
@@ -130,7 +130,7 @@ def test_light_comes_from_beside_the_image(gpu):
     shade = Object(Mesh(plane(side=60.0).positions + np.float32([-30, 10, 0]), plane().faces), MATTE)
     scene = lit(DOWN, mesh=plane(cells=4), material=SKIN, camera=camera, extra=(shade,))
     whole = picture(gpu, scene, TextureSpace(map_size=512), (64, 64))
-    some = picture(gpu, scene, SeenTextureSpace(map_size=512, **only("clipped")), (64, 64))
+    some = picture(gpu, scene, VisibleTextureSpace(map_size=512, **only("clipped")), (64, 64))
     assert np.ptp(whole.aovs["M_front"][32, :, 0]) > 0.02
     np.testing.assert_allclose(some.aovs["M_front"], whole.aovs["M_front"], atol=2e-3)
 
@@ -140,7 +140,7 @@ def test_texels_far_from_the_image_are_dark(gpu):
     scene = lit(DOWN, mesh=plane(cells=4), material=SKIN, camera=camera)
     stage = Stage(gpu, scene)
     frame = shared.begin(Graph(gpu), stage, (96, 64))
-    method = SeenTextureSpace(map_size=512)
+    method = VisibleTextureSpace(map_size=512)
     lit_, _ = lit_texels(gpu, scene, 512, planes=method.planes(frame, stage.bodies[0]))
     texel = 40 / (0.98 * 512)
     margin = 3 * math.sqrt(SKIN_GAUSSIANS.variances[-1]) + 4 * texel
@@ -152,7 +152,7 @@ def test_texels_far_from_the_image_are_dark(gpu):
 def test_an_object_beside_the_image_or_behind_the_camera_has_no_passes(gpu, place):
     scene = lit(SIDE, mesh=sphere(20.0, 500), material=SKIN, camera=FRONT)
     away = replace(scene.objects[0], translate=place)
-    method = SeenTextureSpace(map_size=128)
+    method = VisibleTextureSpace(map_size=128)
     image = picture(gpu, replace(scene, objects=(scene.objects[0], away)), method)
     assert len(drawn(image, "texture_space/dilate")) == len(drawn(image, "texture_space/gather")) == 1
     nothing = picture(gpu, replace(scene, objects=(away,)), method)
@@ -161,7 +161,9 @@ def test_an_object_beside_the_image_or_behind_the_camera_has_no_passes(gpu, plac
 
 def test_switched_off_it_is_deon07_to_the_bit(gpu):
     scene = lit(SIDE, mesh=ear(1000), material=SKIN, camera=PerspectiveCamera((0, 0, 250), (0, 30, 0), fov=30))
-    whole, same = (picture(gpu, scene, m) for m in (TextureSpace(map_size=128), SeenTextureSpace(map_size=128, **OFF)))
+    whole, same = (
+        picture(gpu, scene, m) for m in (TextureSpace(map_size=128), VisibleTextureSpace(map_size=128, **OFF))
+    )
     assert whole.pixels.tobytes() == same.pixels.tobytes()
 
 
@@ -173,7 +175,7 @@ def test_maps_follow_the_distance(gpu, distance):
     d_ref = TEXELS_PER_PIXEL * height / (2 * math.tan(math.radians(fov) / 2)) / texels_per_mm
     camera = PerspectiveCamera((0, distance * d_ref, 0), (0, 0, 0), up=(0, 0, -1), fov=fov)
     image = picture(
-        gpu, lit(DOWN, material=SKIN, camera=camera), SeenTextureSpace(map_size=T_max, **only("depth_based"))
+        gpu, lit(DOWN, material=SKIN, camera=camera), VisibleTextureSpace(map_size=T_max, **only("depth_based"))
     )
     (size,) = drawn(image, "texture_space/dilate")
     exact = min(1.0, 1.0 / distance) * T_max
@@ -182,7 +184,7 @@ def test_maps_follow_the_distance(gpu, distance):
 
 
 def test_the_nearest_corner_counts_and_without_perspective_the_distance_does_not(gpu):
-    method = SeenTextureSpace(map_size=1024)
+    method = VisibleTextureSpace(map_size=1024)
     scene = lit(SIDE, mesh=slab(size=(40, 40, 40)), material=SKIN)
     stage = Stage(gpu, scene)
     density = method.texels_per_mm(stage.bodies[0])
@@ -205,7 +207,7 @@ def test_no_frame_of_a_zoom_waits_for_a_bake_and_memory_stays(gpu, monkeypatch):
         return drawn(renderer.frame(timed=False), "texture_space/dilate")[0]
 
     scene = lit(SIDE, mesh=sphere(20.0, 500), material=SKIN, camera=FRONT)
-    renderer = Renderer(scene, SeenTextureSpace(map_size=256), (64, 64), gpu)
+    renderer = Renderer(scene, VisibleTextureSpace(map_size=256), (64, 64), gpu)
     monkeypatch.setattr(texture_space, "make_charts", lambda *_: pytest.fail("a frame baked"))
     distances = np.geomspace(40, 2000, 12)
     assert len({pull(d) for d in distances}) == 5  # 256, 192, 128, 96, 64
@@ -225,7 +227,7 @@ def test_smaller_maps_are_no_further_from_what_pixels_see(gpu):
     inside = fine.pixels[..., 3].reshape(cells).min(axis=(1, 3)) > 0
     mean = fine.aovs["M_front"].reshape(*cells, 3).mean(axis=(1, 3))
     whole = picture(gpu, scene, TextureSpace(map_size=512), size)
-    small = picture(gpu, scene, SeenTextureSpace(map_size=512), size)
+    small = picture(gpu, scene, VisibleTextureSpace(map_size=512), size)
     assert drawn(small, "texture_space/dilate")[0] <= 256
     errors = [np.sqrt(((image.aovs["M_front"] - mean)[inside] ** 2).mean()) for image in (small, whole)]
     assert errors[0] <= 1.05 * errors[1]
@@ -280,7 +282,7 @@ def test_where_a_back_may_be_seen_nothing_is_culled(gpu):
         scene = lit(DirectionalLight((0, -1, 0.1), (1, 1, 1)), mesh=mesh, material=SKIN, camera=camera)
         whole, some = (
             picture(gpu, scene, m)
-            for m in (TextureSpace(map_size=128), SeenTextureSpace(map_size=128, **only("culled")))
+            for m in (TextureSpace(map_size=128), VisibleTextureSpace(map_size=128, **only("culled")))
         )
         assert whole.aovs["M_front"].max() > 0.1 and some.pixels.tobytes() == whole.pixels.tobytes()
 
@@ -296,7 +298,7 @@ def test_closed_means_that_faces_meet_and_are_outside():
 
 
 def test_switches_are_on_or_off():
-    assert make_method("jimenez08") == SeenTextureSpace(culled=True, depth_based=True, clipped=True)
+    assert make_method("jimenez08") == VisibleTextureSpace(culled=True, depth_based=True, clipped=True)
     for word in ("off", "Off", "false", "no", "0", False, 0):
         assert make_method("jimenez08", {"culled": word}).culled is False, word
     for word in ("on", "TRUE", "yes", "1", True, 1):

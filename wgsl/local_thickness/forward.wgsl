@@ -1,10 +1,10 @@
 // M_back of one object: at its vertices, and between them at the pixels.
 
-import package::mesh::{Vertex, Surface};
+import package::mesh::{Vertex, ObjectUniforms};
 import package::light::{Light, incident};
 import package::irradiance::{transmitted_environment};
 import package::screen::{direction_to_eye, is_hidden};
-import package::thickness::transport::{Transport, let_out, let_out_environment};
+import package::local_thickness::transport::{Transport, let_out, let_out_environment};
 import package::targets::{RGBA32Float};
 
 override MAPPED: bool = true; // whether the base colour varies over the object
@@ -17,7 +17,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> transport: Transport;
-@group(0) @binding(2) var<uniform> surface: Surface;
+@group(0) @binding(2) var<uniform> object: ObjectUniforms;
 @group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(4) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
@@ -38,8 +38,8 @@ struct Pixel {
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
-    let x = (surface.object_to_world * vec4f(vertex.position, 1.0)).xyz;
-    let n = (surface.object_to_world * vec4f(vertex.normal, 0.0)).xyz;
+    let x = (object.object_to_world * vec4f(vertex.position, 1.0)).xyz;
+    let n = (object.object_to_world * vec4f(vertex.normal, 0.0)).xyz;
     let w_o = direction_to_eye(params.eye, x);
     var light_out = let_out_environment(transport) * transmitted_environment(environment, linear_wrap_u, -n, 1.0);
     for (var i = 0u; i < arrayLength(&lights); i++) {

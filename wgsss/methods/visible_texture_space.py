@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import frame as shared
-from wgsss.bake.turns import turns
+from wgsss.bake.normal_spread import normal_spread
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.texture_space import TextureSpace
@@ -37,7 +37,7 @@ _EDGE_TEXELS = 4.0  # what filters read around a texel
 
 
 @dataclass(frozen=True)
-class SeenTextureSpace(TextureSpace):
+class VisibleTextureSpace(TextureSpace):
     """M_front over the part of the atlas that is seen, at the size at which it is seen; M_back is not estimated."""
 
     culled: bool = field(default=True, metadata={"unit": "", "help": "leave out what faces away"})
@@ -89,9 +89,9 @@ class SeenTextureSpace(TextureSpace):
         stage, distance = body.stage, self.spread(body)
 
         def make() -> Any:
-            layout = body.layout
-            turn = turns(body.rest.mesh.positions[layout.vertex], layout.normals, distance)
-            return stage.gpu.buffer(np.minimum(LEAST_COSINE, -np.sin(np.minimum(turn, np.pi / 2))).astype(np.float32))
+            render_mesh = body.render_mesh
+            spread = normal_spread(body.rest.mesh.positions[render_mesh.vertex], render_mesh.normals, distance)
+            return stage.gpu.buffer(np.minimum(LEAST_COSINE, -np.sin(np.minimum(spread, np.pi / 2))).astype(np.float32))
 
         return stage.shared(("least cosines", id(body.rest.mesh), distance), make)
 

@@ -2,7 +2,7 @@
 // blurred by each Gaussian, weakened by the way from there to x_o (Mikkelsen 2009, 3.4 and figure 10).
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
-import package::mesh::{Surface, color_after};
+import package::mesh::{ObjectUniforms, color_after};
 import package::light::{ShadowView, cube_face};
 import package::rectangle::{rectangle_corner};
 import package::screen::{position_of_pixel};
@@ -18,8 +18,8 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> surface: Surface;
-@group(0) @binding(2) var where_seen: texture_2d<f32>;
+@group(0) @binding(1) var<uniform> object: ObjectUniforms;
+@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(3) var normal: texture_2d<f32>;
 @group(0) @binding(4) var base_color: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_depth_2d;
@@ -86,7 +86,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(where_seen, texel, 0).z) != surface.id {
+    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
         discard;
     }
     let x_o = position_of_pixel(pixel.xy, depth, params.clip_to_world);
@@ -117,7 +117,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         M += weight * sum;
         counted += weight; // a ray that passes by says nothing of x_o, which is beside it
     }
-    M *= color_after(surface, textureLoad(base_color, texel, 0).rgb) / max(counted, 1e-6);
+    M *= color_after(object, textureLoad(base_color, texel, 0).rgb) / max(counted, 1e-6);
     let others = textureLoad(so_far, min(texel, textureDimensions(so_far) - 1u), 0).rgb;
     return Pixel(vec4f(others + M, 1.0));
 }

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.bake.turns import turns
+from wgsss.bake.normal_spread import normal_spread
 from wgsss.scene.shapes import sphere
 
 
 @pytest.mark.parametrize("distance", [5.0, 15.0, 45.0])
 def test_on_a_sphere_it_is_the_angle_of_the_chord(distance):
     ball = sphere(20.0, 4000)
-    found = turns(ball.positions, ball.normals, distance)
+    found = normal_spread(ball.positions, ball.normals, distance)
     exact = 2 * np.arcsin(min(distance / 40.0, 1.0))
     assert exact * 0.7 <= found.min() and found.max() <= exact * 1.25 + 0.02  # points are taken together
 
@@ -23,7 +23,7 @@ def test_at_an_edge_it_is_that_of_the_edge_and_elsewhere_nothing():
     nothing = np.zeros_like(t)
     positions = np.concatenate([np.stack([t, s, nothing], 1), np.stack([nothing, s, -t], 1)])
     normals = np.repeat([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]], len(t), axis=0)
-    found = turns(positions.astype(np.float32), normals.astype(np.float32), 6.0)
+    found = normal_spread(positions.astype(np.float32), normals.astype(np.float32), 6.0)
     away = np.concatenate([t, t])
     np.testing.assert_allclose(found[away <= 4.0], np.pi / 2, atol=1e-6)
     np.testing.assert_allclose(found[away >= 8.0], 0.0, atol=1e-3)

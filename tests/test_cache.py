@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from wgsss.bake.cache import cached
+from wgsss.cache import cached
 from wgsss.errors import Note
 
 

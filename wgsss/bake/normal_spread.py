@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.cache import Arrays, cached
+from wgsss.cache import Arrays, cached
 
 Array = npt.NDArray[Any]
 
@@ -15,7 +15,7 @@ _CELLS = 4.0  # per distance: nearer points whose normals are alike are taken to
 _AT_ONCE = 10_000  # points, so that the pairs fit in memory
 
 
-def turns(positions: Array, normals: Array, distance: float) -> Array:
+def normal_spread(positions: Array, normals: Array, distance: float) -> Array:
     """float32 (N,): the largest angle, rad, between the normal at each point and those at points within `distance`.
 
     Args:
@@ -25,13 +25,15 @@ def turns(positions: Array, normals: Array, distance: float) -> Array:
     """
 
     def make() -> Arrays:
-        return {"turns": _turns(positions.astype(np.float64), normals.astype(np.float64), distance)}
+        return {"normal_spread": _normal_spread(positions.astype(np.float64), normals.astype(np.float64), distance)}
 
-    label = f"turns of {len(positions)} normals within {distance:.3g} mm"
-    return cached("turns", [positions, normals, distance], make, code=[_turns], label=label)["turns"]
+    label = f"angles between {len(positions)} normals within {distance:.3g} mm"
+    return cached("normal_spread", [positions, normals, distance], make, code=[_normal_spread], label=label)[
+        "normal_spread"
+    ]
 
 
-def _turns(positions: Array, normals: Array, distance: float) -> Array:
+def _normal_spread(positions: Array, normals: Array, distance: float) -> Array:
     from scipy.spatial import cKDTree
 
     cell = np.floor((positions - positions.min(axis=0)) / (distance / _CELLS)).astype(np.int64)
