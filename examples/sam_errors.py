@@ -14,8 +14,8 @@ from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.frame import begin
 from wgsss.gpu import default_gpu
 from wgsss.graph import Graph
-from wgsss.methods.sam import SpatialAdjacencyMaps
-from wgsss.methods.sam_senders import at_vertices
+from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import converged, irradiance_at
 from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
 from wgsss.stage import Body, Stage

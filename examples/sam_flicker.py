@@ -18,8 +18,8 @@ from sam_errors import M_back, sums
 from tqdm import tqdm
 
 from wgsss.gpu import default_gpu
-from wgsss.methods.sam import SpatialAdjacencyMaps
-from wgsss.methods.sam_senders import at_vertices
+from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import irradiance_at
 from wgsss.scene import DirectionalLight, load_scene
 from wgsss.stage import Stage

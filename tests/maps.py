@@ -11,9 +11,9 @@ from wgsss import frame as shared
 from wgsss.bake.sam import Entries
 from wgsss.bake.sam.tree import tree
 from wgsss.graph import Graph
-from wgsss.methods import sam
-from wgsss.methods.sam import SpatialAdjacencyMaps
-from wgsss.methods.sam_senders import at_vertices
+from wgsss.methods.sam import method as sam
+from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.upload import at_vertices
 from wgsss.scene import MATERIALS, DirectionalLight, Mesh, OrthographicCamera
 from wgsss.stage import Stage
 

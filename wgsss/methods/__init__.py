@@ -14,7 +14,7 @@ from wgsss.methods.local_thickness import LocalThickness
 from wgsss.methods.method import Diffused, Method
 from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
-from wgsss.methods.sam import SURFACES, Adjacency, SpatialAdjacencyMaps
+from wgsss.methods.sam.method import SURFACES, Adjacency, SpatialAdjacencyMaps
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps

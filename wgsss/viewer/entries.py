@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from wgsss.methods import Method
 from wgsss.methods.pair import Pair
-from wgsss.methods.sam import Adjacency
-from wgsss.methods.sam_motion import places_at_rest
+from wgsss.methods.sam.deform import places_at_rest
+from wgsss.methods.sam.method import Adjacency
 from wgsss.stage import Stage
 
 Array = npt.NDArray[Any]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wgsss.bake.sam.fan_quadrature import Fans
 from wgsss.bake.sam.fans import adjacency, fan_areas, kites
-from wgsss.bake.sam.parts import Fans
 from wgsss.scene import Mesh
 from wgsss.scene.shapes import ear, slab
 

@@ -10,7 +10,7 @@ import pytest
 
 from wgsss.bake import sam as module
 from wgsss.bake.sam import SELECTIONS, Entries, spatial_adjacency_map
-from wgsss.bake.sam.soundness import concerns
+from wgsss.bake.sam.mesh_checks import concerns
 from wgsss.bake.sam.tree import tree
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError

@@ -9,26 +9,26 @@ from typing import Any
 import numpy as np
 
 from wgsss.bake.rays import Caster
-from wgsss.bake.sam.blend import blend
-from wgsss.bake.sam.blocks import Blocks
-from wgsss.bake.sam.bounds import Bounds
-from wgsss.bake.sam.coarse import select_coarse
-from wgsss.bake.sam.entries import BYTES, Entries
-from wgsss.bake.sam.everything import everything
+from wgsss.bake.sam.fan_quadrature import Fans
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.fit import SECOND, select_fit
+from wgsss.bake.sam.fit.batched_nnls import nonnegative
+from wgsss.bake.sam.fit.neighbour_mixture import MIX_BYTES, mix
+from wgsss.bake.sam.fit.omp import pursue
+from wgsss.bake.sam.fit.patch_form_factors import QuickFormFactors
+from wgsss.bake.sam.fit.receiver_patches import Patches
+from wgsss.bake.sam.fit.refit import refit
+from wgsss.bake.sam.fit.select import SECOND, select_fit
+from wgsss.bake.sam.fit.smoothed_means import blend
+from wgsss.bake.sam.fit.training import training
 from wgsss.bake.sam.form_factors import FormFactors
-from wgsss.bake.sam.mix import MIX_BYTES, mix
-from wgsss.bake.sam.nonnegative import nonnegative
-from wgsss.bake.sam.parts import Fans
-from wgsss.bake.sam.patches import Patches
-from wgsss.bake.sam.pursuit import pursue
-from wgsss.bake.sam.quick import QuickFormFactors
-from wgsss.bake.sam.refit import refit
-from wgsss.bake.sam.rows import senders
-from wgsss.bake.sam.soundness import concerns
-from wgsss.bake.sam.top import best, select_top
-from wgsss.bake.sam.training import training
+from wgsss.bake.sam.full_tree import everything
+from wgsss.bake.sam.mesh_checks import concerns
+from wgsss.bake.sam.published.blocks import Blocks
+from wgsss.bake.sam.published.bounds import Bounds
+from wgsss.bake.sam.published.coarse import select_coarse
+from wgsss.bake.sam.published.top import best, select_top
+from wgsss.bake.sam.sender_map import BYTES, Entries
+from wgsss.bake.sam.sender_tree import senders
 from wgsss.bake.sam.tree import tree
 from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.errors import InputError, Note, unknown

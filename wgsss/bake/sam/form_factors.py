@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam.parts import Fans, Points
+from wgsss.bake.sam.fan_quadrature import Fans, Points
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile

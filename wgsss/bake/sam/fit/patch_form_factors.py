@@ -1,0 +1,95 @@
+"""Form factors of all that reaches patches of vertices: between near fans integrated over both, beyond that R_d at
+their distance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.sam.sender_tree import NEAR, ORDER, Senders, near_pairs
+from wgsss.gpu import Gpu
+from wgsss.optics import Profile
+from wgsss.scene.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+BEYOND = 5e-4
+"""share of the light of a plane that comes from farther away than what is looked at"""
+TAIL = 1e-5
+"""share of it that comes from farther away than what is known at all"""
+FAINT = 2e-3
+"""share of what leaves a plane in all, below which a node is not looked into"""
+NEAREST = 3.0
+"""roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
+_SHIFT = 16  # bits of a squared distance that the table of R_d leaves out: it has 128 entries each time that it doubles
+_LEAST = 1e-3  # its first distance, of what is looked at
+
+
+class QuickFormFactors:
+    """K (000 eq. 11) of one mesh and profile, from senders to patches of vertices."""
+
+    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
+        self.farthest = float(profile.range(BEYOND).max())
+        self.faint = FAINT * float(profile.total.max())
+        known = np.array([_LEAST * self.farthest, profile.range(TAIL).max()], np.float32)
+        ends = np.square(known).view(np.int32) >> _SHIFT
+        self._first, last = int(ends[0]), int(ends[1])
+        middles = (np.arange(self._first, last + 1, dtype=np.int32) << _SHIFT) + (1 << (_SHIFT - 1))
+        R = profile.reflectance(np.sqrt(middles.view(np.float32).astype(np.float64))).astype(np.float32)
+        self._R = np.append(R.T, np.zeros((3, 1), np.float32), axis=1)  # nothing from beyond
+
+        pairs = near_pairs(mesh)
+        factors = FormFactors(gpu, mesh, profile)
+        apart = np.linalg.norm(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]], axis=1)
+        width = np.sqrt(factors.fans.area[pairs].max(axis=1))
+        nearest = apart < NEAREST * width
+        self._near = np.zeros((len(pairs), 3), np.float32)
+        for which, order in ((nearest, ORDER), (~nearest, 1)):
+            self._near[which] = factors.of(pairs[which], most=order)
+        self._vertices = len(mesh.positions)
+        self._pairs = np.append(pairs[:, 0] * self._vertices + pairs[:, 1], np.iinfo(np.int64).max)
+
+    def reflectance(self, squared: Array) -> Array:
+        """R_d, 1/mm^2, (3, ...), at the roots of `squared` (...) mm^2, float32."""
+        return self._R.take(np.clip(self._entry(squared), 0, self._R.shape[1] - 1), axis=1)
+
+    def __call__(self, s: Senders, vertices: Array, senders: Array) -> Array:
+        """float32 (B, 3, P, C): from senders (B, C) to vertices (B, P), 0 where they are not behind them (eq. 13, 14),
+        and of those that are -1."""
+        first = s.x[vertices[:, :1]]  # near them, products lose nothing
+
+        def near(x: Array, which: Array) -> Array:
+            return x[which] - first
+
+        def product(a: Array, b: Array) -> Array:
+            return a @ b.transpose(0, 2, 1)
+
+        def own(a: Array, b: Array) -> Array:
+            return np.einsum("bnd,bnd->bn", a, b)
+
+        n, centre, far = s.n[vertices], near(s.centre, vertices), near(s.centre, senders)
+        back = product(n, near(s.x, senders)) < own(n, near(s.x, vertices))[:, :, None]
+        back &= product(n, s.n[senders]) < 0.0
+        square = product(-2.0 * centre, far)
+        square += own(centre, centre)[:, :, None]
+        square += own(far, far)[:, None]
+        area = np.where(senders >= 0, s.area[senders], np.float32(0.0))[:, None]
+        K = np.empty((len(back), 3, *back.shape[1:]), np.float32)
+        entry, counted = self._entry(square), area * back
+        for channel, R in enumerate(self._R):
+            np.multiply(R.take(entry, mode="clip"), counted, out=K[:, channel])
+
+        width = np.maximum(s.area[vertices][:, :, None], area)
+        back &= (square < 2.0 * NEAR**2 * width) & (senders < self._vertices)[:, None]  # those that may be among pairs
+        b, p, c = np.nonzero(back)
+        pair = vertices[b, p] * np.int64(self._vertices) + senders[b, c]
+        at = np.searchsorted(self._pairs, pair)
+        known = self._pairs[at] == pair
+        K[b[known], :, p[known], c[known]] = self._near[at[known]]
+        return K
+
+    def _entry(self, square: Array) -> Array:
+        return (square.view(np.int32) >> np.int32(_SHIFT)) - np.int32(self._first)
