@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from wgsss.errors import InputError
-from wgsss.folders import appearing, made
+from wgsss.folders import atomic_folder, created_folder
 
 
 @pytest.mark.parametrize("there", [False, True])
@@ -19,7 +19,7 @@ def test_files_appear_at_once_beside_what_is_there(tmp_path: Path, there: bool) 
         folder.mkdir()
         (folder / "old").write_text("old")
         (folder / "a").write_text("old")
-    with appearing(folder) as place:
+    with atomic_folder(folder) as place:
         for name in "ab":
             (place / name).write_text("new")
         assert not (folder / "b").exists()
@@ -36,7 +36,7 @@ def test_what_fails_leaves_nothing(tmp_path: Path, error: type[BaseException], t
     folder = tmp_path / "out"
     if there:
         folder.mkdir()
-    with pytest.raises(error), appearing(folder) as place:
+    with pytest.raises(error), atomic_folder(folder) as place:
         (place / "a").write_text("new")
         raise error
     assert list(tmp_path.iterdir()) == ([folder] if there else []) and not list(folder.glob("*"))
@@ -45,7 +45,7 @@ def test_what_fails_leaves_nothing(tmp_path: Path, error: type[BaseException], t
 def test_a_folder_in_the_place_of_a_file_keeps_all_others_away(tmp_path: Path) -> None:
     (tmp_path / "out" / "b").mkdir(parents=True)
     with pytest.raises(InputError, match="b: this is a folder, in the place of a file"):
-        with appearing(tmp_path / "out") as place:
+        with atomic_folder(tmp_path / "out") as place:
             for name in "abc":
                 (place / name).write_text("new")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["b"]
@@ -62,7 +62,7 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("name", BAD, ids=[name[:6].replace("\0", "NUL") for name in BAD])
-@pytest.mark.parametrize("make", [appearing, made])
+@pytest.mark.parametrize("make", [atomic_folder, created_folder])
 def test_what_is_no_folder_is_told_before_the_block(tmp_path: Path, name: str, make: Callable[[Path], object]) -> None:
     prepare, says = BAD[name]
     prepare(tmp_path / name)
@@ -75,9 +75,9 @@ def test_what_is_no_folder_is_told_before_the_block(tmp_path: Path, name: str, m
 
 def test_folders_made_for_nothing_go_again_and_others_stay(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
-    with made(tmp_path / "a" / "b" / "c"):
+    with created_folder(tmp_path / "a" / "b" / "c"):
         assert (tmp_path / "a" / "b" / "c").is_dir()
     assert list((tmp_path / "a").iterdir()) == []
-    with made(tmp_path / "a" / "b" / "c"):
+    with created_folder(tmp_path / "a" / "b" / "c"):
         (tmp_path / "a" / "b" / "kept").touch()
     assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["kept"]

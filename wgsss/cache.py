@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import saying, wgsl
+from wgsss import console, wgsl
 from wgsss.errors import Note
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -66,7 +66,7 @@ def cached(
         return found
     from threadpoolctl import threadpool_limits
 
-    with saying.doing(label), threadpool_limits(1, "blas"):
+    with console.activity(label), threadpool_limits(1, "blas"):
         arrays = {name: np.asarray(values) for name, values in make().items()}
     try:
         _write(path, arrays)

@@ -1,4 +1,4 @@
-"""The exceptions and the warning that users are meant to read."""
+"""The exceptions and the warning class whose messages users read."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ _LONGEST = 60  # characters of a name in a message
 
 
 class InputError(ValueError):
-    """Bad input. Its message is one line that says what is wrong and where; commands print it and exit with 2."""
+    """Bad input. Its one-line message says what is wrong and where. Commands print it and exit with code 2."""
 
 
 class RenderError(RuntimeError):
-    """A fault of the renderer or the driver, not of the input: one line; commands print it and exit with 1."""
+    """A fault of the renderer or the driver. Commands print its one-line message and exit with code 1."""
 
 
 class Note(UserWarning):
-    """One line that tells the user what was left out, repaired or taken otherwise than asked for."""
+    """A one-line warning for the user: something was left out, repaired, or interpreted differently than requested."""
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
-    """An error for a name that is not among those known, suggesting the nearest one."""
+    """Build the error for an unknown name. It lists the known names and suggests the most similar one."""
     name = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3]}..."
     known = sorted(known)
     near = difflib.get_close_matches(name.lower(), [k.lower() for k in known], n=1, cutoff=0.5)

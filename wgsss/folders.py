@@ -1,4 +1,4 @@
-"""Folders to write to: all files of one appear at once or not at all, and what was made for nothing goes again."""
+"""Output folders: all files of a folder appear at once or not at all, and no empty folder is left behind."""
 
 from __future__ import annotations
 
@@ -12,48 +12,48 @@ from wgsss.errors import InputError
 
 
 @contextmanager
-def appearing(folder: Path) -> Iterator[Path]:
-    """A folder to write to, whose files move to `folder` when the block ends and vanish if it fails.
+def atomic_folder(folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder whose files move to `folder` when the block ends, and are deleted if it fails.
 
-    What else is in `folder` stays. Raises InputError where it cannot be written: before the block, where that shows.
+    Other files in `folder` stay. Raises InputError if `folder` cannot be written, before the block runs if possible.
     """
     target = _resolved(folder)
-    with _told(folder):
+    with _naming_path(folder):
         if target.exists() and not target.is_dir():
             raise InputError(f"{folder}: this is not a folder")
         if not target.parent.is_dir():
             raise InputError(f"{folder}: there is no folder '{target.parent}'")
-        place = (target if target.is_dir() else target.parent) / f".wgsss-{os.getpid()}"
+        temporary = (target if target.is_dir() else target.parent) / f".wgsss-{os.getpid()}"
         try:
-            place.mkdir()
-            yield place
-            _move(place, target)
+            temporary.mkdir()
+            yield temporary
+            _move_files(temporary, target)
         finally:
-            shutil.rmtree(place, ignore_errors=True)
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _move(place: Path, target: Path) -> None:
-    files = list(place.iterdir())
+def _move_files(source: Path, target: Path) -> None:
+    files = list(source.iterdir())
     for file in files:
         if (target / file.name).is_dir():
             raise InputError(f"{target / file.name}: this is a folder, in the place of a file")
     if files and not target.exists():
-        place.rename(target)
+        source.rename(target)
     else:
         for file in files:
             os.replace(file, target / file.name)
 
 
 @contextmanager
-def made(folder: Path) -> Iterator[None]:
-    """Make a folder and those above it; those that were made and hold nothing when the block ends go again.
+def created_folder(folder: Path) -> Iterator[None]:
+    """Create a folder and its parents for the block. At its end, delete those that it created and that are empty.
 
-    Raises InputError where that cannot be.
+    Raises InputError if the folder cannot be created.
     """
     target = _resolved(folder)
     missing: list[Path] = []
     try:
-        with _told(folder):
+        with _naming_path(folder):
             if target.exists() and not target.is_dir():
                 raise InputError(f"{folder}: this is not a folder")
             missing += (path for path in (target, *target.parents) if not path.exists())
@@ -66,7 +66,8 @@ def made(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _told(folder: Path) -> Iterator[None]:
+def _naming_path(folder: Path) -> Iterator[None]:
+    """Turn an OSError in the block into an InputError that names the folder."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Text that comes from users, where it is shown: names and values may hold anything."""
+"""Formatting of text that comes from users: names and values may contain any character."""
 
 from __future__ import annotations
 
@@ -12,41 +12,43 @@ _JOINERS = "\u200c\u200d"  # between letters of some scripts, and in emoji
 
 
 def escaped(text: object) -> str:
-    """Text in which what does not show, breaks the line or turns the direction of writing is an escape, as \\x1b."""
+    """Replace invisible characters, line breaks and changes of the writing direction by escapes such as \\x1b."""
     return "".join(_escape(c) if c not in _JOINERS and unicodedata.category(c) in _HIDDEN else c for c in str(text))
 
 
 def one_line(text: object) -> str:
-    """Escaped text, whose white space becomes single spaces."""
+    """Escape text, and replace each run of white space by one space."""
     return escaped(" ".join(str(text).split()))
 
 
 def printable(text: str) -> str:
-    """Escaped lines."""
+    """Escape each line of a text."""
     return "\n".join(escaped(line) for line in text.split("\n"))
 
 
 def shortened(text: object, most: int) -> str:
-    """One line of text, of `most` characters at most."""
+    """Escape text on one line and cut it to at most `most` characters."""
     line = one_line(text)
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def figure_text(text: object, most: int = 80) -> str:
-    """A line of text for matplotlib, which would read what is between two $ as TeX, and leave a label with a leading _
-    out of legends."""
+    """Escape a line of text for matplotlib.
+
+    Matplotlib would read text between two $ as TeX, and would leave a label with a leading _ out of legends.
+    """
     line = shortened(text, most).replace("$", r"\$")
     return f" {line}" if line.startswith("_") else line
 
 
 def span(low: float, high: float, above: bool = False, unit: str = "") -> str:
-    """A range in words; `above` leaves out its low end."""
+    """Describe a range in words. `above` excludes its lower end."""
     ends = f"above {low:g} and at most {high:g}" if above else f"from {low:g} to {high:g}"
     return f"{ends} ({unit})" if unit else ends
 
 
 def shown(value: Any) -> str:
-    """A value in a message."""
+    """Format a value for a message."""
     try:
         text = one_line(repr(value))
     except (ValueError, RecursionError):  # an integer of thousands of digits, a list in itself
@@ -55,7 +57,7 @@ def shown(value: Any) -> str:
 
 
 def script_json(value: Any) -> str:
-    """A value as JSON that is safe inside of a <script> of a page, whatever strings it holds."""
+    """Format a value as JSON that is safe inside a <script> element, whatever strings it contains."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return "".join(f"\\u{ord(c):04x}" if c in "<>&\u2028\u2029" or "\ud800" <= c <= "\udfff" else c for c in text)
 

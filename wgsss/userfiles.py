@@ -1,4 +1,4 @@
-"""Files that users name: whether they can be read at all, before anything opens them."""
+"""Checks on files that users name, made before anything reads them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 from wgsss.errors import InputError
 
 MOST_BYTES = 1 << 32
-"""of a file; a sparse one may claim any size"""
+"""Largest size of an input file in bytes. A sparse file may claim any size."""
 MOST_TEXT = 1 << 26
-"""bytes of a file of text"""
+"""Largest size of a text file in bytes."""
 
 
 def require_file(path: Path, *, most_bytes: int = MOST_BYTES, may_be_empty: bool = False) -> None:
-    """Raise InputError unless there is a regular file there that can be read and is not empty.
+    """Raise InputError unless the path is a regular file that can be read and is not empty.
 
     Folders, devices, pipes and sockets are refused before they are opened: reading one may never end.
     """
@@ -38,9 +38,9 @@ def require_file(path: Path, *, most_bytes: int = MOST_BYTES, may_be_empty: bool
 
 
 def read_text(path: Path, kind: str) -> str:
-    """The text of a UTF-8 file, without the mark at its beginning that some editors write.
+    """Read a UTF-8 text file. A byte order mark at its beginning is skipped.
 
-    `kind` names what the file should be. Raises InputError where it cannot be read or is no such text.
+    `kind` names the expected kind of file in errors. Raises InputError if the file cannot be read or is not UTF-8.
     """
     require_file(path, most_bytes=MOST_TEXT)
     try:
@@ -52,9 +52,9 @@ def read_text(path: Path, kind: str) -> str:
 
 
 def path_from(text: str, folder: Path) -> Path:
-    """The path that a text names, relative to a folder, ~ and ~USER being home folders.
+    """Resolve a path relative to a folder. ~ and ~USER stand for home folders.
 
-    Raises InputError where there is no such user, and where the text is empty.
+    Raises InputError if the text is empty, or if the user does not exist.
     """
     if not text.strip():
         raise InputError("the name of the file is empty")

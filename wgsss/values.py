@@ -1,4 +1,4 @@
-"""Numbers that users give: what counts as one."""
+"""Checks on numbers that users give."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 
 def is_number(value: Any) -> bool:
-    """Whether this is a finite number: no text, no truth value, no integer beyond what a float holds."""
+    """Whether a value is a finite number. Text, truth values and integers too large for a float are not."""
     try:
         return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
     except (TypeError, OverflowError):  # a complex number, an integer of hundreds of digits
@@ -18,13 +18,13 @@ def is_number(value: Any) -> bool:
 
 
 def array_of(values: Any) -> npt.NDArray[np.float64]:
-    """Numbers in nested lists, or an array of them, as float64. Raises ValueError where there is anything else."""
+    """Convert nested lists of numbers, or an array, to float64. Raises ValueError for anything else."""
     if isinstance(values, np.ndarray) and values.dtype.kind in "iuf":
         return values.astype(np.float64)
-    found = np.array(values, dtype=object)
-    if not all(map(_is_float, found.ravel())):
+    objects = np.array(values, dtype=object)
+    if not all(map(_is_float, objects.ravel())):
         raise ValueError
-    return found.astype(np.float64)
+    return objects.astype(np.float64)
 
 
 def _is_float(value: Any) -> bool:

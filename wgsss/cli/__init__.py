@@ -1,6 +1,7 @@
 """The command line: `wgsss COMMAND`.
 
-Exit codes: 0 done, 1 a fault of the renderer, 2 bad input. Nothing heavy is imported before a command runs.
+Exit codes: 0 success, 1 a fault of the renderer, 2 bad input. Large packages are imported only by the command that
+uses them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from wgsss import __version__, saying
+from wgsss import __version__, console
 from wgsss.cli import bake, bench, catalogue, compare, export, info, profile, render, view
 from wgsss.cli.arguments import Parser
 from wgsss.cli.signals import Stopped, stoppable
@@ -27,12 +28,12 @@ _LONGEST, _LONGEST_LINE = 200, 2000  # characters of a library's message, and of
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command with its arguments (by default the process's) and give back the exit code."""
-    saying.occupy_standard_streams()
+    """Run a command and return the exit code. `argv` defaults to the arguments of the process."""
+    console.occupy_standard_streams()
     try:
-        with stoppable(), _told_warnings() as told:
+        with stoppable(), _printed_notes() as notes:
             args = _parse(sys.argv[1:] if argv is None else argv)
-            args.warnings = told
+            args.warnings = notes
             args.run(args)
         return 0
     except InputError as error:
@@ -45,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return stop.code
     except KeyboardInterrupt:
         return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has gone
+    except BrokenPipeError:  # the reader closed the pipe
         return PIPE_CLOSED
     except MemoryError as error:
         return _unexpected(f"there is not enough memory for this ({one_line(error) or 'how much is not known'})")
@@ -73,15 +74,18 @@ def _parse(argv: Sequence[str]) -> Any:
 
 
 @contextmanager
-def _told_warnings() -> Iterator[list[str]]:
-    """Each Note in the block on standard error, once, and in the list. What libraries warn of is left out."""
-    told: list[str] = []
+def _printed_notes() -> Iterator[list[str]]:
+    """Print each different Note that the block raises on standard error, and yield the list of them.
+
+    Warnings of libraries are ignored.
+    """
+    notes: list[str] = []
 
     def show(message: Warning | str, *where: Any, **more: Any) -> None:
         text = one_line(message)
-        if text not in told:
-            told.append(text)
-            saying.aside(f"wgsss: warning: {text}")
+        if text not in notes:
+            notes.append(text)
+            console.print_message(f"wgsss: warning: {text}")
 
     silent = logging.NullHandler()  # without any handler, Python prints what libraries log
     logging.getLogger().addHandler(silent)
@@ -90,25 +94,27 @@ def _told_warnings() -> Iterator[list[str]]:
             warnings.simplefilter("ignore")
             warnings.filterwarnings("always", category=Note)
             warnings.showwarning = show
-            yield told
+            yield notes
     finally:
         logging.getLogger().removeHandler(silent)
 
 
 def _leave(code: int) -> None:
-    """End the process, with what is to be done at its end, but without taking down the interpreter: threads of
-    libraries that are still at work would crash meanwhile."""
+    """Run the exit handlers and end the process without shutting down the interpreter.
+
+    Threads of libraries may still run, and would crash while the interpreter shuts down.
+    """
     with suppress(Exception):
         atexit._run_exitfuncs()
     os._exit(code)
 
 
 def _fail(message: object, code: int) -> int:
-    saying.aside(f"wgsss: error: {shortened(message, _LONGEST_LINE)}")
+    console.print_message(f"wgsss: error: {shortened(message, _LONGEST_LINE)}")
     return code
 
 
 def _unexpected(message: str) -> int:
     if os.environ.get("WGSSS_DEBUG") == "1":
-        saying.aside(traceback.format_exc().rstrip())
+        console.print_message(traceback.format_exc().rstrip())
     return _fail(message, 1)

@@ -1,4 +1,4 @@
-"""What several commands take, and how they say what they did."""
+"""Arguments that several commands share, their parsing, and the output of results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from wgsss import saying
+from wgsss import console
 from wgsss.errors import InputError
 from wgsss.text import escaped, printable, shown, span
 
@@ -31,7 +31,7 @@ intensity = [1, 1, 1]}'; may be given again"""
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are ours: one line."""
+    """An argument parser that raises InputError with a one-line message."""
 
     def __init__(self, **rest: Any) -> None:
         super().__init__(**rest, allow_abbrev=False)
@@ -41,16 +41,16 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message} (see '{self.prog} --help')")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        (saying.aside if file is sys.stderr else saying.result)(message.rstrip("\n"))
+        (console.print_message if file is sys.stderr else console.print_result)(message.rstrip("\n"))
 
     @property
     def options(self) -> list[str]:
-        """The long options there are."""
+        """The names of all long options."""
         return [name for action in self._actions for name in action.option_strings if name.startswith("--")]
 
 
 def command(commands: Any, name: str, run: Any, summary: str, **rest: Any) -> Parser:
-    """Declare a command; `run` is called with its arguments."""
+    """Declare a command. `run` is called with the parsed arguments."""
     parser: Parser = commands.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.", **rest)
     parser.set_defaults(run=run)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -58,13 +58,13 @@ def command(commands: Any, name: str, run: Any, summary: str, **rest: Any) -> Pa
 
 
 def add_scene(parser: Parser) -> None:
-    """The scene, and the choices that go with it."""
+    """Add the argument SCENE and the options that change it."""
     parser.add_argument("scene", metavar="SCENE", help=_SCENE)
     add_scene_choices(parser)
 
 
 def add_scene_choices(parser: Parser) -> None:
-    """What may be other than a scene has it."""
+    """Add the options that replace parts of a scene."""
     add = parser.add_argument
     add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
     add("--size-mm", metavar="X", type=length, help="of a mesh file: length of its longest side, mm")
@@ -78,13 +78,13 @@ def add_scene_choices(parser: Parser) -> None:
 
 
 def has_scene_choices(args: argparse.Namespace) -> bool:
-    """Whether anything is to be other than a scene has it."""
+    """Whether any option that changes a scene was given."""
     named = (args.material, args.size_mm, args.animation, args.simplify, args.vertices, args.camera)
     return any(value is not None for value in named) or bool(args.light or args.file_camera or args.file_lights)
 
 
 def add_method(parser: Parser) -> None:
-    """The method, and its knobs."""
+    """Add the options that choose a method and set its knobs."""
     add = parser.add_argument
     add("--method", metavar="NAME", help=f"default: {DEFAULT_METHOD} (see 'wgsss methods')")
     add("--surface", metavar="NAME", help="instead of a method: what estimates the light from the front, and")
@@ -93,7 +93,7 @@ def add_method(parser: Parser) -> None:
 
 
 def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
-    """The scene that the arguments name, or another one, with their choices."""
+    """Load the scene `name`, by default that of the arguments, with the options that change it."""
     from wgsss.scene import load_scene
 
     return load_scene(
@@ -111,7 +111,7 @@ def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
 
 
 def make_method(args: argparse.Namespace) -> Method:
-    """The method that the arguments name, its knobs set."""
+    """Create the method that the arguments name, with its knobs set."""
     from wgsss.methods import make_method
 
     parts = args.surface, args.translucency
@@ -122,60 +122,60 @@ def make_method(args: argparse.Namespace) -> Method:
     return make_method("+".join("none" if part is None else part for part in parts), dict(args.knobs))
 
 
-def tell(args: argparse.Namespace, result: dict[str, Any], text: str) -> None:
-    """Print a command's result: as JSON where that was asked for, which holds the warnings too, else as text."""
-    saying.result(saying.json_text({**result, "warnings": args.warnings}) if args.json else printable(text))
+def emit(args: argparse.Namespace, result: dict[str, Any], text: str) -> None:
+    """Print the result of a command: with --json as JSON, which includes the warnings, else as text."""
+    console.print_result(console.json_text({**result, "warnings": args.warnings}) if args.json else printable(text))
 
 
 def table(rows: list[list[str]]) -> str:
-    """Rows of text in columns, one row a line."""
+    """Format rows of text as a table with aligned columns, one row per line."""
     rows = [[escaped(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
 
 
 def size(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT in pixels."""
+    """Parse WIDTHxHEIGHT, in pixels."""
     from wgsss.scene.images.files import MAX_SIDE
 
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
         raise argparse.ArgumentTypeError(f"{shown(text)} is not WIDTHxHEIGHT, such as 512x512")
-    found = int(match[1]), int(match[2])
-    if not all(1 <= side <= MAX_SIDE for side in found):
+    sides = int(match[1]), int(match[2])
+    if not all(1 <= side <= MAX_SIDE for side in sides):
         raise argparse.ArgumentTypeError(f"the image size must be 1 to {MAX_SIDE} pixels a side, not {text}")
-    return found
+    return sides
 
 
 def count(text: str, most: int = 999_999_999) -> int:
-    """A whole number from 1 to `most`."""
+    """Parse a whole number from 1 to `most`."""
     if not re.fullmatch(r"[0-9]{1,9}", text) or not 1 <= int(text) <= most:
         raise argparse.ArgumentTypeError(f"{shown(text)} is not a whole number from 1 to {most}")
     return int(text)
 
 
 def frames(text: str) -> int:
-    """How many frames: an hour has 100,000 or so."""
+    """Parse a number of frames, at most about one hour of film."""
     return count(text, 100_000)
 
 
 def number(text: str) -> float:
-    """A number."""
+    """Parse a number."""
     return _within(text, -1e300, 1e300)
 
 
 def length(text: str) -> float:
-    """Millimetres."""
+    """Parse a length in millimetres."""
     return _within(text, 1e-6, 1e13, "mm")
 
 
 def seconds(text: str) -> float:
-    """A time."""
+    """Parse a time in seconds."""
     return _within(text, -1e9, 1e9, "seconds")
 
 
 def rate(text: str) -> float:
-    """Frames per second."""
+    """Parse a rate in frames per second."""
     return _within(text, 0.01, 1000)
 
 
@@ -191,14 +191,14 @@ def _within(text: str, low: float, high: float, unit: str = "") -> float:
 
 
 def output(text: str) -> Path:
-    """The path of a file or folder to write."""
+    """Parse the path of a file or folder to write."""
     if not text.strip() or "\0" in text:
         raise argparse.ArgumentTypeError(f"{shown(text)} is not the name of a file or folder")
     return Path(text)
 
 
 def assignment(text: str) -> tuple[str, str]:
-    """KNOB=VALUE."""
+    """Parse KNOB=VALUE."""
     name, equals, value = text.partition("=")
     if not (name and equals and value):
         raise argparse.ArgumentTypeError(f"{shown(text)} is not KNOB=VALUE, such as map_size=512")
@@ -206,35 +206,35 @@ def assignment(text: str) -> tuple[str, str]:
 
 
 def table_of(text: str) -> dict[str, Any]:
-    """A table of TOML in one line."""
+    """Parse an inline table of TOML."""
     try:
-        found = tomllib.loads(f"table = {text}")["table"]
-    except (ValueError, RecursionError):  # of the grammar, a number too long, nested too deep
-        found = None
-    if not isinstance(found, dict):
+        value = tomllib.loads(f"table = {text}")["table"]
+    except (ValueError, RecursionError):  # a syntax error, a number too long, nested too deep
+        value = None
+    if not isinstance(value, dict):
         raise argparse.ArgumentTypeError(
             f'{shown(text)} is not a table such as {{kind = "orthographic", height = 200}}'
         )
-    return found
+    return value
 
 
 def name_or_table(text: str) -> str | dict[str, Any]:
-    """A name, or a table of TOML in one line."""
+    """Parse a name, or an inline table of TOML."""
     return table_of(text) if text.startswith("{") else text
 
 
 def settings(text: str) -> list[tuple[str, dict[str, str]]]:
-    """NAME,NAME:KNOB=VALUE:…, each once: names and the knobs that are set."""
-    found = []
+    """Parse NAME,NAME:KNOB=VALUE:… into names and their knobs. Duplicates are dropped."""
+    methods = []
     for name in names(text):
         name, *knobs = (part.strip() for part in name.split(":"))
-        found.append((name, dict(assignment(knob) for knob in knobs)))
-    return found
+        methods.append((name, dict(assignment(knob) for knob in knobs)))
+    return methods
 
 
 def names(text: str) -> list[str]:
-    """NAME,NAME,…, each once."""
-    found = [name.strip() for name in text.split(",")]
-    if not all(found):
+    """Parse NAME,NAME,… Duplicates are dropped."""
+    parts = [name.strip() for name in text.split(",")]
+    if not all(parts):
         raise argparse.ArgumentTypeError(f"{shown(text)} is not a list of names such as lambert,deon07")
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(parts))

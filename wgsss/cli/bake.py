@@ -23,15 +23,15 @@ def run(args: Any) -> None:
     method = arguments.make_method(args)
     scene = arguments.load_scene(args)
     folder = cache.folder()
-    before = cache.entries()
+    old_entries = cache.entries()
     start = time.perf_counter()
     stage = Stage(default_gpu(), scene)
     method.bake(stage)
     for body in stage.bodies:
         _ = body.environment
     seconds = time.perf_counter() - start
-    made = {file: size for file, size in sorted(cache.entries().items()) if file not in before}
-    entries = [{"file": str(file), "bytes": size} for file, size in made.items()]
-    lines = [f"{file.name}  {size / 1e6:.1f} MB" for file, size in made.items()]
-    lines.append(f"{len(made) or 'no'} new entries in {one_line(folder)}, {seconds:.2f} s")
-    arguments.tell(args, {"folder": str(folder), "made": entries, "seconds": round(seconds, 3)}, "\n".join(lines))
+    new_entries = {file: size for file, size in sorted(cache.entries().items()) if file not in old_entries}
+    entries = [{"file": str(file), "bytes": size} for file, size in new_entries.items()]
+    lines = [f"{file.name}  {size / 1e6:.1f} MB" for file, size in new_entries.items()]
+    lines.append(f"{len(new_entries) or 'no'} new entries in {one_line(folder)}, {seconds:.2f} s")
+    arguments.emit(args, {"folder": str(folder), "made": entries, "seconds": round(seconds, 3)}, "\n".join(lines))

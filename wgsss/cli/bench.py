@@ -1,11 +1,11 @@
-"""`wgsss bench`: what methods cost and how far off they are, over their knobs, as a chart."""
+"""`wgsss bench`: measure the time and the error of methods over their knobs, and chart them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from wgsss import saying
+from wgsss import console
 from wgsss.cli import arguments
 from wgsss.errors import InputError
 from wgsss.text import one_line
@@ -59,14 +59,14 @@ def run(args: Any) -> None:
             args.size or (256, 256),
             reference=args.reference,
             scheduler=args.scheduler,
-            tell=_tell,
+            tell=_print_run,
         )
     else:
         if arguments.has_scene_choices(args):
             raise InputError("without a scene there is nothing to measure: --material and the like do not apply")
         runs = read(args.output)
     files = [str(file) for file in draw(read(args.output), args.output)]
-    arguments.tell(
+    arguments.emit(
         args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *map(one_line, files)])
     )
 
@@ -80,28 +80,29 @@ def _speedup(args: Any) -> None:
         raise InputError("the table speedup is of the scene crowd as it is: --material and the like do not apply")
     if args.methods is not None or args.scheduler is not None:
         raise InputError("the table speedup is of two methods, measured here: --methods and --scheduler do not apply")
-    table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_tell_cell)
+    table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_print_cell)
     about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"
     lines = [arguments.table(table.rows()), "", f"{about}, maps of {table.map_size}, {table.adapter}"]
     file = str(args.output / FILE)
-    arguments.tell(args, {**table.json(), "files": [file]}, "\n".join([*lines, "", one_line(file)]))
+    arguments.emit(args, {**table.json(), "files": [file]}, "\n".join([*lines, "", one_line(file)]))
 
 
 TABLES = {"speedup": _speedup}
 
 
-def _tell_cell(cell: Any) -> None:
-    if not saying.on_terminal():
+def _print_cell(cell: Any) -> None:
+    """Print a line about a measured cell of the table, unless a progress bar is shown."""
+    if not console.is_terminal():
         times = f"{cell.full_ms:.0f} ms to {cell.seen_ms:.0f} ms"
-        saying.aside(f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times")
+        console.print_message(f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times")
 
 
-def _tell(run: dict[str, Any]) -> None:
-    """A line per run where no bar shows how far it is."""
-    if not saying.on_terminal():
+def _print_run(run: dict[str, Any]) -> None:
+    """Print a line about a finished run, unless a progress bar is shown."""
+    if not console.is_terminal():
         cells = dict(zip(_HEAD, _row(run), strict=True))
         setting = " ".join(filter(None, (cells["scene"], "by", cells["method"], cells["knobs"])))
-        saying.aside(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %"))
+        console.print_message(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %"))
 
 
 def _rows(runs: list[dict[str, Any]]) -> list[list[str]]:

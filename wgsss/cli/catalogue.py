@@ -1,4 +1,4 @@
-"""`wgsss scenes`, `methods` and `materials`: what there is."""
+"""`wgsss scenes`, `methods` and `materials`: lists of what is built in."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def declare(commands: Any) -> None:
 def scenes(args: Any) -> None:
     from wgsss.scene.builtin import SCENES
 
-    found = [{"name": name, "about": (make.__doc__ or "").strip().split("\n")[0]} for name, make in SCENES.items()]
-    arguments.tell(args, {"scenes": found}, arguments.table([[s["name"], s["about"]] for s in found]))
+    rows = [{"name": name, "about": (make.__doc__ or "").strip().split("\n")[0]} for name, make in SCENES.items()]
+    arguments.emit(args, {"scenes": rows}, arguments.table([[row["name"], row["about"]] for row in rows]))
 
 
 def methods(args: Any) -> None:
@@ -26,19 +26,19 @@ def methods(args: Any) -> None:
 
     result = {"methods": _described(METHODS), "references": _described(REFERENCES)}
     rows: list[list[str]] = []
-    for kind, found in result.items():
-        for entry in found:
+    for kind, entries in result.items():
+        for entry in entries:
             rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
             for knob in entry["knobs"]:
                 rows.append(["", f"--set {knob['name']}={_word(knob['default'])}  {knob['help']}, {_values(knob)}"])
     pairs = {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
     lines = [f"--{part} one of {', '.join(names)}" for part, names in pairs.items()]
     text = "\n".join([arguments.table(rows), "", "or a pair of", *(f"  {line}" for line in lines)])
-    arguments.tell(args, {**result, "pairs": pairs}, text)
+    arguments.emit(args, {**result, "pairs": pairs}, text)
 
 
 def _values(knob: dict[str, Any]) -> str:
-    """What a knob may be set to, in words."""
+    """Describe the values that a knob may have."""
     if "choices" in knob:
         return "one of " + ", ".join(knob["choices"])
     if isinstance(knob["default"], bool):
@@ -48,7 +48,7 @@ def _values(knob: dict[str, Any]) -> str:
 
 
 def _word(value: Any) -> str:
-    """A knob's value as `--set` takes it."""
+    """Format the value of a knob as `--set` takes it."""
     return ("on" if value else "off") if isinstance(value, bool) else str(value)
 
 
@@ -65,16 +65,16 @@ def _knobs(kind: Any) -> list[dict[str, Any]]:
 def materials(args: Any) -> None:
     from wgsss.scene import MATERIALS
 
-    found = []
+    entries = []
     for name, medium in MATERIALS.items():
         entry: dict[str, Any] = {"name": name, "eta": medium.eta, "base_color": medium.base_color}
         if medium.gaussians is None:
             entry |= {"sigma_s_prime": medium.sigma_s_prime, "sigma_a": medium.sigma_a}
         else:
             entry |= {"variances": medium.gaussians.variances.tolist(), "weights": medium.gaussians.weights.tolist()}
-        found.append(entry)
-    rows = [[m["name"], _medium(m), f"eta {m['eta']:g}"] for m in found]
-    arguments.tell(args, {"materials": found}, arguments.table(rows))
+        entries.append(entry)
+    rows = [[m["name"], _medium(m), f"eta {m['eta']:g}"] for m in entries]
+    arguments.emit(args, {"materials": entries}, arguments.table(rows))
 
 
 def _medium(entry: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""`wgsss compare`: methods beside a reference."""
+"""`wgsss compare`: render a scene by several methods, and measure their errors against a reference."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ def run(args: Any) -> None:
     methods = [make_method(name, knobs) for name, knobs in args.methods or ((name, None) for name in METHODS)]
     reference = make_reference(args.reference)
     scene = arguments.load_scene(args)
-    found = compare(scene, methods, reference, args.size)
+    comparison = compare(scene, methods, reference, args.size)
     if args.lights:
         from wgsss.study.light_types import light_types
 
         lit = light_types(scene).items()
-        found = replace(
-            found,
+        comparison = replace(
+            comparison,
             lights={name: compare(other, methods, reference, args.size, by_cause=False) for name, other in lit},
         )
-    written = write_report(found, folder)
+    written = write_report(comparison, folder)
 
-    result = {**found.json(), "files": [str(file) for file in written]}
-    parts = [tables.aligned(tables.by_method(found)), tables.floor(found)]
-    if found.causes:
-        parts.append(f"by cause: alone (and what it adds)\n{tables.aligned(tables.by_cause(found))}")
-    if found.lights:
-        parts.append(f"by type of light: rel RMSE\n{tables.aligned(tables.by_light(found))}")
-    arguments.tell(args, result, "\n\n".join([*parts, one_line(folder / "report.html")]))
+    result = {**comparison.json(), "files": [str(file) for file in written]}
+    parts = [tables.aligned(tables.by_method(comparison)), tables.floor(comparison)]
+    if comparison.causes:
+        parts.append(f"by cause: alone (and what it adds)\n{tables.aligned(tables.by_cause(comparison))}")
+    if comparison.lights:
+        parts.append(f"by type of light: rel RMSE\n{tables.aligned(tables.by_light(comparison))}")
+    arguments.emit(args, result, "\n\n".join([*parts, one_line(folder / "report.html")]))

@@ -1,4 +1,4 @@
-"""`wgsss export`: a scene for other renderers."""
+"""`wgsss export`: write a scene for other programs."""
 
 from __future__ import annotations
 
@@ -39,4 +39,4 @@ def run(args: Any) -> None:
         written.append(output_gltf.export(scene, args.gltf, args.size[0] / args.size[1]))
         lines.append(one_line(f"{args.gltf}: {scene.name}, glTF"))
     result = {"files": [str(file) for file in written], "scene": scene.name, "size": args.size, "time": args.time}
-    arguments.tell(args, result, "\n".join(lines))
+    arguments.emit(args, result, "\n".join(lines))

@@ -1,4 +1,4 @@
-"""`wgsss info`: what to paste in a bug report, or what a file holds."""
+"""`wgsss info`: describe this machine for a bug report, or describe the contents of a file."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def run(args: Any) -> None:
         from wgsss.cli.filetext import text_of
         from wgsss.scene.describe import describe
 
-        found = describe(args.file)
-        arguments.tell(args, found, text_of(found))
+        description = describe(args.file)
+        arguments.emit(args, description, text_of(description))
 
 
 def _about_this_machine(args: Any) -> None:
@@ -48,12 +48,12 @@ def _about_this_machine(args: Any) -> None:
             versions[package] = version(package)
         except PackageNotFoundError:
             versions[package] = "not installed"
-    found = [{key: a.info[key] for key in ("device", "adapter_type", "description", "vendor")} for a in adapters()]
+    devices = [{key: a.info[key] for key in ("device", "adapter_type", "description", "vendor")} for a in adapters()]
     sizes = cache.entries().values()
     result: dict[str, Any] = {
         "versions": versions,
         "platform": platform.platform(),
-        "adapters": found,
+        "adapters": devices,
         "chosen": None,
         "cache": {"folder": str(cache.folder()), "entries": len(sizes), "bytes": sum(sizes)},
     }
@@ -65,9 +65,9 @@ def _about_this_machine(args: Any) -> None:
         result["limits"] = {
             name: {"asked": asked, "adapter": gpu.adapter.limits[name]} for name, asked in LIMITS.items()
         }
-    except InputError as error:  # what is known helps all the same
+    except InputError as error:  # the other lines are useful without a device
         failure = error
-    arguments.tell(args, result, _text(result))
+    arguments.emit(args, result, _text(result))
     if failure:
         raise failure
 

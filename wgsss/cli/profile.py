@@ -1,11 +1,11 @@
-"""`wgsss profile`: the diffusion profile of a material by several models."""
+"""`wgsss profile`: compare models of the diffusion profile of a material."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from wgsss import saying
+from wgsss import console
 from wgsss.cli import arguments
 from wgsss.text import one_line, shown
 
@@ -56,29 +56,29 @@ def run(args: Any) -> None:
     models = list(dict.fromkeys(args.models or profiles.default_models(case)))
     if args.photons and "photons" not in models:
         models.append("photons")
-    found = profiles.profiles(case, models)
-    r = profiles.distances_for(found) if args.r is None else np.array(args.r)
-    rows = [profiles.described(name, profile, r, args.k) for name, profile in found.items()]
+    by_model = profiles.profiles(case, models)
+    r = profiles.distances_for(by_model) if args.r is None else np.array(args.r)
+    rows = [profiles.described(name, profile, r, args.k) for name, profile in by_model.items()]
     if output:
         from wgsss.study.profile_plot import plot
 
-        plot(found, _title(case), output)
+        plot(by_model, _title(case), output)
     if args.csv:
-        saying.result(_csv(rows, r))
+        console.print_result(_csv(rows, r))
     else:
         text = "\n".join([*_about(case), "", _totals(rows, args.k), *(["", _values(rows, r)] if args.r else [])])
-        arguments.tell(
+        arguments.emit(
             args, {"material": material.name, "models": rows}, text + (f"\n\n{one_line(output)}" if output else "")
         )
 
 
 def gaussians(text: str) -> int:
-    """1 to 6."""
+    """Parse a number of Gaussians, 1 to 6."""
     return arguments.count(text, 6)
 
 
 def radii(text: str) -> list[float]:
-    """Distances in mm, with commas between them."""
+    """Parse distances in mm, separated by commas."""
     values = [arguments.number(part) for part in text.split(",")]
     if not 0 <= min(values) <= max(values) <= 1e12:
         raise argparse.ArgumentTypeError(f"{shown(text)} has a distance that is not from 0 to 1e12 (mm)")
@@ -90,7 +90,7 @@ def _title(case: Any) -> str:
 
 
 def _about(case: Any) -> list[str]:
-    """The medium, and the lengths that other programs go by."""
+    """Lines about the medium: its coefficients, and the derived lengths that other programs use."""
     lines = []
     for number, layer in enumerate(case.stack if case.material.stack else [], start=1):
         depth = "without end" if layer.thickness == float("inf") else f"{layer.thickness:g} mm thick"

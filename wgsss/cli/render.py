@@ -1,4 +1,4 @@
-"""`wgsss render`: a scene to a picture."""
+"""`wgsss render`: render a scene to a picture or a film."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss.cli import arguments
-from wgsss.saying import progress
+from wgsss.console import progress_bar
 from wgsss.text import one_line
 
 if TYPE_CHECKING:
@@ -82,11 +82,11 @@ def run(args: Any) -> None:
         if args.graph:
             result["graph"] = _described(graph)
             lines.append(str(graph))
-    arguments.tell(args, result, "\n".join(lines))
+    arguments.emit(args, result, "\n".join(lines))
 
 
 def _time(args: Any, number: int) -> float:
-    """Of a frame, seconds."""
+    """The time of a frame, in seconds."""
     return args.time + number / args.fps
 
 
@@ -97,7 +97,7 @@ def _frames(renderer: Renderer, args: Any, path: Path) -> Iterator[Image]:
     aovs = AOVS if path.suffix.lower() in LINEAR_FORMATS else ()
     numbers: Any = range(args.frames)
     if args.frames > 1:
-        numbers = progress(numbers, desc=one_line(path.name), unit="frame")
+        numbers = progress_bar(numbers, desc=one_line(path.name), unit="frame")
     for number in numbers:
         yield renderer.frame(_time(args, number), aovs, timed=False)
 

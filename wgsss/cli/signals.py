@@ -1,4 +1,4 @@
-"""Signals that end a command as an exception, so that what it began is cleaned up."""
+"""Turns signals that end a command into an exception, so that temporary files are deleted."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _AGAIN_S = 0.02  # after which a signal whose exception was lost is raised once 
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal asked the command to end. All that handles an interrupt from the keyboard handles it too."""
+    """A signal asked the command to end. Handlers of KeyboardInterrupt catch it too."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -25,10 +25,10 @@ class Stopped(KeyboardInterrupt):
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Raise Stopped in the block at the first signal that asks to end, and ignore those that follow.
+    """Raise Stopped in the block at the first signal that asks the process to end, and ignore later signals.
 
-    A signal that is ignored already, as by nohup, stays so. After Stopped the process is about to end, and signals stay
-    ignored. Only the main thread can do this; in another one nothing is changed.
+    A signal that was ignored before, for example by nohup, stays ignored. After Stopped, signals stay ignored because
+    the process is about to end. Python handles signals in the main thread only: in other threads this does nothing.
     """
     stopped = 0  # by which signal
 
@@ -66,7 +66,7 @@ def stoppable() -> Iterator[None]:
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, which only a signal wakes from what it waits for."""
+    """Send a signal to the main thread, to interrupt a blocking call."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.samples import Samples, count, longest_edges, subdivided
+from wgsss.console import progress_bar
 from wgsss.frame import begin, irradiance_points
 from wgsss.graph import Graph
 from wgsss.optics import Profile
 from wgsss.reference.kernel import make_kernel
 from wgsss.reference.surface_sum import Points, surface_sum
-from wgsss.saying import progress
 from wgsss.scene import Mesh
 from wgsss.stage import Body
 
@@ -61,7 +61,7 @@ def at_spacing(body: Body, receivers: Samples, L_d: Array, profile: Profile, spa
     kernel = make_kernel(profile, spacing, across)
     total = len(flux) * len(L_d)
     label = f"{mesh.name}, {len(flux)} samples"
-    with progress(total=total, desc=label, unit=" pairs", unit_scale=True) as bar:
+    with progress_bar(total=total, desc=label, unit=" pairs", unit_scale=True) as bar:
         sources, places = (Points(at.position, at.normal) for at in (there, here))
         front, back = surface_sum(body.stage.gpu, kernel, sources, flux, places, bar)
     return SimpleNamespace(front=front + kernel.near * L_d, back=back, samples=len(flux))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
-from wgsss.folders import appearing, made
+from wgsss.folders import atomic_folder, created_folder
 from wgsss.reference.mitsuba_xml import SMOOTH, described, environment_file, environments
 from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight, checks
 
@@ -37,7 +37,7 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
         notes.append("lamps hide what is behind them")
     checks.image_size(size)
     folder = Path(folder)
-    with made(folder.parent), appearing(folder) as place:
+    with created_folder(folder.parent), atomic_folder(folder) as place:
         files = [place / "scene.xml", *write_meshes(scene, place), *write_environment(scene, place)]
         files[0].write_text(described(scene, size), encoding="utf-8")
     written = [folder / file.name for file in files]

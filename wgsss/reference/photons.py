@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss import wgsl
+from wgsss.console import progress_bar
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.optics import Layer, Photons
 from wgsss.optics.fresnel import diffuse_fresnel
 from wgsss.optics.medium import check_index, stack
-from wgsss.saying import progress
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def trace(
     check_index("eta_below", eta_below)
     shortest = 1.0 / max(layer.sigma_t_prime.max() for layer in layers)
     innermost = int(np.float32((_NEAREST * shortest) ** 2).view(np.uint32) >> 20)
-    with progress(total=3 * photons, desc=label, unit=" photons", unit_scale=True) as bar:
+    with progress_bar(total=3 * photons, desc=label, unit=" photons", unit_scale=True) as bar:
         tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, sky, bar)
         keys = [np.random.SeedSequence([seed, channel]).generate_state(2) for channel in range(3)]
         counts = [tracer.follow(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]

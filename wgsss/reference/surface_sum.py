@@ -44,7 +44,7 @@ def surface_sum(
     """The sums of kernel(|x_i - x_o|) times the `flux` (N, 3) of samples, for each receiver: front and back (M, 3).
 
     Equal arguments give equal bits on one adapter. Parts of the sum are cached as they are done, so that what is
-    interrupted goes on where it was. `bar`, of `saying.progress`, counts pairs of a receiver and a sample.
+    interrupted goes on where it was. `bar`, of `console.progress_bar`, counts pairs of a receiver and a sample.
     """
     source = _Source(gpu, kernel, samples, flux)
     order = _along_curve(receivers.position)

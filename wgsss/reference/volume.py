@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.console import progress_bar
 from wgsss.errors import Note
 from wgsss.frame import begin
 from wgsss.graph import Graph
 from wgsss.reference.estimate import Estimate, Reference
 from wgsss.reference.mitsuba_paths import Paths
 from wgsss.reference.mitsuba_scene import check
-from wgsss.saying import progress
 from wgsss.stage import Stage
 
 Array = npt.NDArray[Any]
@@ -62,7 +62,7 @@ class Volume(Reference):
         scattered, variance = np.zeros((2, len(pixels.rays), 3))
         with (
             Paths(scene, size, pixels.rays) as paths,
-            progress(total=len(renderings) * self.samples, desc="volume", unit=" paths/pixel") as bar,
+            progress_bar(total=len(renderings) * self.samples, desc="volume", unit=" paths/pixel") as bar,
         ):
             for channel, scatters in renderings:
                 mean, square = paths.follow(channel, scatters, self.samples, bar)

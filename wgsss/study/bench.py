@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wgsss.console import progress_bar
 from wgsss.errors import InputError, unknown
-from wgsss.saying import progress
 from wgsss.study.run_line import Run
 from wgsss.study.runs import FILE, appended, read
 
@@ -65,7 +65,7 @@ def bench(
     ):
         done = {_key(run): run for run in before if run["adapter"] in adapters}
         todo = [(scene, spec) for scene, spec in specs if _key(spec.json()) not in done]
-        bar = progress(total=len(specs), initial=len(specs) - len(todo), unit="run")
+        bar = progress_bar(total=len(specs), initial=len(specs) - len(todo), unit="run")
         with bar:
             for run in runs(todo):
                 append(run)

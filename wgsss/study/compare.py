@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy.typing as npt
 
+from wgsss.console import progress_bar
 from wgsss.errors import unknown
 from wgsss.gpu import default_gpu
 from wgsss.methods import METHODS, Method, make_method, name_of
 from wgsss.reference import REFERENCES, Estimate, Reference
 from wgsss.rendering import Image, Renderer
-from wgsss.saying import progress
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 from wgsss.study.cost import frame_cost
@@ -114,7 +114,7 @@ def compare(
     image = shown(truth, truth_by, scene, size, time)
     seen = image.pixels[..., 3] > 0.0
     runs = []
-    for name, method in progress(made.items(), desc=one_line(scene.name), unit="method"):
+    for name, method in progress_bar(made.items(), desc=one_line(scene.name), unit="method"):
         run = _run(name, method, scene, size, time)
         found = errors(
             run["image"].aovs["M_front"] + run["image"].aovs["M_back"],

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.folders import appearing
+from wgsss.folders import atomic_folder
 from wgsss.output import save
 from wgsss.rendering import Image
 from wgsss.study import contact_sheet, error_maps, tables
@@ -35,7 +35,7 @@ def write_report(comparison: Comparison, folder: Path) -> list[Path]:
     All appear at once, when all are written; files of other names that are in the folder stay.
     Raises InputError where the folder cannot be written.
     """
-    with appearing(folder) as place:
+    with atomic_folder(folder) as place:
         numbers = {**comparison.json(), "versions": versions()}
         (place / "metrics.json").write_text(json.dumps(numbers, indent=2, allow_nan=False) + "\n")
         (place / "report.html").write_text(page(comparison), encoding="utf-8")
@@ -54,7 +54,7 @@ def write_report(comparison: Comparison, folder: Path) -> list[Path]:
 
 def check_folder(folder: Path) -> Path:
     """The folder, if a report can be written there; to be asked before anything that takes long. Raises InputError."""
-    with appearing(folder):
+    with atomic_folder(folder):
         return folder
 
 

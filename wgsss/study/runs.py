@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wgsss.errors import InputError, Note
-from wgsss.folders import made
+from wgsss.folders import created_folder
 from wgsss.study.run_line import Run, parsed
 from wgsss.userfiles import require_file
 
@@ -61,7 +61,7 @@ def appended(folder: Path) -> Iterator[tuple[list[Run], Callable[[Run], None]]]:
     written.
     """
     path = folder / FILE
-    with made(folder):
+    with created_folder(folder):
         held = path.exists()
         if held:
             require_file(path, may_be_empty=True)

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from wgsss.folders import made
+from wgsss.console import progress_bar
+from wgsss.folders import created_folder
 from wgsss.gpu import default_gpu
 from wgsss.methods import make_method
 from wgsss.output import replacing
 from wgsss.rendering import Renderer
-from wgsss.saying import progress
 from wgsss.scene import PerspectiveCamera, Scene
 from wgsss.scene.builtin import crowd
 
@@ -99,7 +99,7 @@ def speedup(
     cell as it is done. Raises InputError where the file cannot be written.
     """
     path = Path(folder) / FILE
-    with made(path.parent):
+    with created_folder(path.parent):
         table = _measured(size, tell)
         with replacing(path) as (file,):
             file.write_text(json.dumps(table.json(), indent=2) + "\n", encoding="utf-8")
@@ -111,7 +111,7 @@ def _measured(size: tuple[int, int], tell: Callable[[Cell], None]) -> Table:
     cells: list[Cell] = []
     clock = ""
     todo = list(product(enumerate(HEADS), enumerate(DISTANCES)))
-    for (row, heads), (column, distance) in progress(todo, unit="cell"):
+    for (row, heads), (column, distance) in progress_bar(todo, unit="cell"):
         scene = view(heads, distance)
         kinds = [
             Renderer(scene, make_method(name, {"map_size": map_size}), size) for name in ("texture+none", "jimenez08")

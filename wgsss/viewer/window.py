@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wgsss import saying
+from wgsss import console
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
 from wgsss.methods import Method
@@ -204,6 +204,6 @@ class Window:
         with suppress(glfw.GLFWError):
             glfw.set_clipboard_string(self.canvas._window, command)
         with suppress(InputError, BrokenPipeError):
-            saying.result(f"copied: {command}")
+            console.print_result(f"copied: {command}")
         self.state.note(f"copied: {command}")
         return command

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from wgsss.bake.sam.fit.patch_form_factors import QuickFormFactors
 from wgsss.bake.sam.fit.smoothed_means import WIDTHS
 from wgsss.bake.sam.sender_tree import Senders, reaching
-from wgsss.saying import progress
+from wgsss.console import progress_bar
 
 Array = npt.NDArray[Any]
 
@@ -50,7 +50,7 @@ class Patches:
         """Work on some at a time, on all cores."""
         parts = [Patches(self.node[i : i + _AT_ONCE], self.leaf) for i in range(0, len(self.node), _AT_ONCE)]
         with (
-            progress(total=len(self.node), desc=label, unit=" patches") as bar,
+            progress_bar(total=len(self.node), desc=label, unit=" patches") as bar,
             ThreadPoolExecutor(os.cpu_count()) as pool,
         ):
             for part, _ in zip(parts, pool.map(work, parts), strict=True):

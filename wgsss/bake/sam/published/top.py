@@ -13,10 +13,10 @@ from wgsss import wgsl
 from wgsss.bake.sam.form_factors import MOST, FormFactors
 from wgsss.bake.sam.published.blocks import Blocks
 from wgsss.bake.sam.sender_map import Entries, empty
+from wgsss.console import progress_bar
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
-from wgsss.saying import progress
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -48,7 +48,7 @@ def best(gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None =
     factors = FormFactors(gpu, mesh, profile)
     search = Search(gpu, mesh, profile, factors, n + 5 + n // 2, sending)
     shown: dict[str, Any] = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
-    with progress(total=len(mesh.positions), **shown) as bar:
+    with progress_bar(total=len(mesh.positions), **shown) as bar:
         for receivers, found in search:
             rough = _factors(factors, receivers, found, most=1).sum(axis=2)
             found = np.take_along_axis(found, np.argsort(-rough, axis=1, kind="stable")[:, :n], axis=1)
