@@ -1,4 +1,4 @@
-"""What is rendered: meshes, materials, lights, cameras and the files they come from. No GPU code."""
+"""Scenes: meshes, materials, lights, cameras, and the files they are read from. No GPU code."""
 
 from __future__ import annotations
 

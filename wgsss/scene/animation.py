@@ -1,4 +1,4 @@
-"""Animations of glTF files as motions: skins, morph targets and moving nodes."""
+"""Motions of meshes that play animations of glTF files: skins, morph targets and moving nodes."""
 
 from __future__ import annotations
 
@@ -19,29 +19,32 @@ from wgsss.scene.rig import Rig
 Array = npt.NDArray[Any]
 
 _MOST_NAMES = 8  # of animations in a message
-_NOTHING = 1e-6  # share of its modelled size up to which a part is scaled to nothing
-_MOST_KEYS = 64  # at which a part is looked for that is hidden at rest
+_NOTHING = 1e-6  # share of its modelled size up to which a part counts as scaled to nothing
+_MOST_KEYS = 64  # keys at which a part that is hidden at rest is searched
 
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """An animation as a file has it, of all its parts or of some."""
+    """An animation of a file, for all of its parts or for some."""
 
     name: str
     rig: Rig
     channels: tuple[Channel, ...]
-    """those that move the rig's vertices, at least one"""
+    """the channels that move vertices of the rig, at least one"""
     duration_s: float
-    """seconds from time 0 to the animation's last key, whatever that moves: all parts begin anew together"""
+    """seconds from time 0 to the last key of the whole animation, so that all parts repeat together"""
 
     def of(self, rig: Rig) -> Clip | None:
-        """The same for some of the parts; None where they do not move."""
+        """Restrict the clip to the parts of `rig`. Returns None if they do not move."""
         movers, morphed = rig.movers(), {part.node for part in rig.parts}
         used = tuple(c for c in self.channels if c.node in (morphed if c.path == "weights" else movers))
         return replace(self, rig=rig, channels=used) if used else None
 
     def positions(self, time_s: float) -> Array:
-        """float64 (V, 3): all vertices of the rig, in the file's unit, at a time from 0 to the last key."""
+        """Compute the positions of all vertices of the rig at a time between 0 and the last key.
+
+        Returns float64 (V, 3), in the unit of the file.
+        """
         pose = self.rig.nodes.rest.copy()
         for channel in self.channels:
             channel.put(pose, time_s)
@@ -50,25 +53,25 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """The motion of a mesh by a clip, over and over.
+    """A motion of a mesh that repeats a clip.
 
-    It knows where the V vertices are at any time, and uses nothing of the positions at rest but their number.
+    It computes the positions of the V vertices from the clip alone. Of the positions at rest it uses only their number.
     """
 
     clip: Clip
     vertices: Blend
-    """where each of the V is among the clip's vertices"""
+    """the V vertices as weighted means of the vertices of the clip"""
     mm_per_unit: float
     centre: Array
-    """float64 (3,), mm: the mesh's origin, in the file's space"""
+    """float64 (3,), mm: the origin of the mesh in the space of the file"""
 
     @property
     def period_s(self) -> float:
-        """Seconds from time 0 to the clip's last key."""
+        """Seconds from time 0 to the last key of the clip."""
         return self.clip.duration_s
 
     def apply(self, positions: npt.ArrayLike, time_s: float) -> npt.NDArray[np.float32]:
-        """Positions (V, 3), mm, at a time in seconds. Raises InputError for other positions than (V, 3)."""
+        """Return the positions (V, 3), mm, at a time in seconds. Raises InputError if `positions` is not (V, 3)."""
         count = len(self.vertices.index)
         if np.shape(positions) != (count, 3):
             raise InputError(f"animation {self.clip.name}: it moves {count} vertices, and no others")
@@ -78,11 +81,11 @@ class Animation:
 
 
 def choose_clip(contents: Contents, name: str | None, say: Callable[[str], None]) -> Clip | None:
-    """One of a file's animations, with those of its channels that move vertices; None where nothing moves.
+    """Choose an animation of a file, with the channels that move vertices. Returns None if nothing moves.
 
-    `name` is the animation's, or its number from 0; None stands for the first one, and NONE for none. What does not
-    play, though nobody chose, is said, and how many channels move nothing.
-    Raises InputError where there is no such animation.
+    `name` is the name of the animation or its number from 0. None stands for the first animation, NONE for no
+    animation. `say` is called with a line that names the other animations if `name` is None, and with a line that
+    counts the channels that move nothing. Raises InputError if there is no such animation.
     """
     names = list(contents.animations)
     if name is None and len(names) > 1:
@@ -101,36 +104,39 @@ def choose_clip(contents: Contents, name: str | None, say: Callable[[str], None]
     if contents.rig is None or not channels:
         return None
     whole = Clip(name, contents.rig, channels, max(float(channel.times[-1]) for channel in channels))
-    found = whole.of(contents.rig)
-    idle = len(channels) - (0 if found is None else len(found.channels))
+    clip = whole.of(contents.rig)
+    idle = len(channels) - (0 if clip is None else len(clip.channels))
     if idle:
         say(f"animation {name}: {counted(idle, 'channel')} {'moves' if idle == 1 else 'move'} nothing that is drawn")
-    return found
+    return clip
 
 
 def unfolded(placed: Sequence[Array], clip: Clip) -> list[Array]:
-    """Positions (V, 3) of each part at rest; where it is scaled to nothing then, those at the key of its largest size:
-    they show which of its faces meet."""
-    found = list(placed)
+    """Return positions (V, 3) for each part from which its topology can be read.
+
+    These are the positions at rest, `placed`. A part that is scaled to nothing at rest, and so has all its vertices at
+    one point, gets the positions at the key where it is largest.
+    """
+    shapes = list(placed)
     modelled = [np.ptp(part.positions, axis=0).max() for part in clip.rig.parts]
     size = [np.ptp(at, axis=0).max() for at in placed]
-    hidden = [n for n in range(len(found)) if size[n] <= _NOTHING * modelled[n]]
+    hidden = [n for n in range(len(shapes)) if size[n] <= _NOTHING * modelled[n]]
     if not hidden:
-        return found
+        return shapes
     ends = np.cumsum([len(part.positions) for part in clip.rig.parts])[:-1]
     times = np.unique(np.concatenate([channel.times for channel in clip.channels]))
     for time_s in times[np.unique(np.linspace(0, len(times) - 1, _MOST_KEYS).astype(int))]:
         for number, at in enumerate(np.split(clip.positions(float(time_s)), ends)):
             length = np.ptp(at, axis=0).max()
             if number in hidden and size[number] < length < np.inf:
-                found[number], size[number] = at, length
-    return found
+                shapes[number], size[number] = at, length
+    return shapes
 
 
 def first_of_equal(rig: Rig) -> Array:
-    """int (V,): for each vertex the first one of its node that is at the same place.
+    """For each vertex, return the index of the first vertex of its node with the same modelled position: int (V,).
 
-    What is one point of the surface where it was modelled stays one: neither rounding nor weights open a seam.
+    Vertices that coincide in the modelled shape then stay together when it moves: rounding cannot open a seam.
     """
     nodes = np.repeat([part.node for part in rig.parts], [len(part.positions) for part in rig.parts])
     modelled = np.concatenate([part.positions for part in rig.parts]).astype(np.float32)

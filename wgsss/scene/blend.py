@@ -1,4 +1,4 @@
-"""Vertices that lie between others."""
+"""Vertices defined as weighted means of other vertices."""
 
 from __future__ import annotations
 
@@ -22,17 +22,20 @@ class Blend:
 
     @classmethod
     def same(cls, index: Array) -> Blend:
-        """Vertices that are each one of the others (N,)."""
+        """Create vertices that each equal one of the others, with indices (N,)."""
         weight = np.zeros((len(index), 3))
         weight[:, 0] = 1
         return cls(np.repeat(index[:, None], 3, axis=1), weight)
 
     def at(self, chosen: Array) -> Blend:
-        """Some of the vertices, by index."""
+        """Select some of the vertices by index."""
         return Blend(self.index[chosen], self.weight[chosen])
 
     def of(self, values: Array) -> Array:
-        """(N, k) of the others' (V, k). What is one of them has its value to the bit."""
+        """Interpolate values (V, k) of the others: (N, k).
+
+        A vertex that equals one of the others gets its exact value.
+        """
         first, *rest = (self.weight[:, i, None] * values[self.index[:, i]] for i in range(3))
         for more in rest:
             first = first + more

@@ -1,4 +1,4 @@
-"""Mesh files as bodies: parts of one look joined, cut by their mask, scaled, welded and repaired."""
+"""Mesh files as bodies: parts with the same material are joined, cut by their alpha mask, scaled, welded, repaired."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from wgsss.scene.textures import TextureReader, coordinates, first_texture, shar
 Array = npt.NDArray[Any]
 
 MOST_VERTICES = 2_796_202
-"""What a storage binding of 128 MiB, WebGPU's default limit, holds of the 48 bytes of a vertex."""
+"""Vertices of 48 bytes that fit in a storage binding of 128 MiB, the default limit of WebGPU."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedMesh:
-    """One body of a mesh file: a surface, its textures, how it moves, and what the file says of its material."""
+    """One body of a mesh file: a mesh, its textures, its motion and its material as the file describes it."""
 
     mesh: Mesh
     maps: Maps = field(default_factory=Maps)
     motion: Animation | None = None
     look: Look = field(default_factory=Look)
-    """as the file has it"""
+    """the material as the file describes it"""
     mm_per_unit: float = 1.0
-    """millimetres per unit of the file's lengths, as it was scaled"""
+    """millimetres per unit of length of the file, after scaling"""
     translate: Triple = (0.0, 0.0, 0.0)
-    """where the mesh's origin lies in the file's space, mm: not zero only for what is far from the file's origin"""
+    """mm: the origin of the mesh in the space of the file; not zero only for bodies far from the origin of the file"""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedFile:
-    """All bodies of a mesh file, and its own lights and cameras."""
+    """All bodies, lights and cameras of a mesh file."""
 
     bodies: tuple[LoadedMesh, ...]
     lights: tuple[LightSource, ...]
@@ -69,7 +69,7 @@ def load_mesh(
 ) -> LoadedMesh:
     """Read a mesh file as one body. Arguments, warnings and errors are those of `load_file`.
 
-    Where its materials differ, only what they share is kept; a warning says what is not.
+    Where its materials differ, only their common properties are kept. A warning lists the others.
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
     looks = [usable_look(part, file.say) for part in file.contents.parts]
@@ -84,21 +84,23 @@ def load_file(
     animation: str | None = None,
     simplify: int | None = None,
 ) -> LoadedFile:
-    """Read a .ply, .obj, .stl, .off, .glb or .gltf file: one body for each look that its materials have.
+    """Read a .ply, .obj, .stl, .off, .glb or .gltf file: one body for each different material.
 
-    `mm_per_unit` is the length of the file's unit; without it, 1000 for glTF, whose unit is the metre, and 1 for the
-    others. `size_mm` scales the longest side of the bounding box, at rest, to a length, whatever the unit. `animation`
-    is the name of the glTF animation that becomes the motion, or its number: without it the first one, and none where
-    it is "none". `simplify` is the greatest number of faces of a body: one with more is simplified, and loses texture
-    coordinates, normals, vertex colours and motion.
+    Args:
+        mm_per_unit: millimetres per unit of length of the file; by default 1000 for glTF, whose unit is the metre, and
+            1 for the other formats.
+        size_mm: length of the longest side of the bounding box at rest, mm, whatever the unit.
+        animation: name or number of the glTF animation to play, by default the first; "none" plays none.
+        simplify: largest number of faces of a body. A body with more is simplified, and loses its texture coordinates,
+            normals, vertex colours and motion.
 
-    Normals are kept where they are not smooth. Degenerate and duplicate faces and unused vertices are dropped, faces
-    wound inwards turned over and holes counted, in one warning for each body. What the file has and wgsss does not use
-    is a warning each.
+    Normals of the file are kept if they differ from smooth ones. Degenerate faces, duplicate faces and unused vertices
+    are dropped, faces wound inwards are flipped, and holes are counted: one warning for each body lists all of that.
+    Each thing in the file that wgsss does not use is one warning.
 
-    Raises InputError, naming the file, where it is missing, not what its extension says, empty, without an area, larger
-    than the device can hold, or holds positions that are not finite, for a skin, morph targets or an animation that do
-    not fit it, and for a scale that is not positive.
+    Raises InputError, naming the file: if it is missing, empty, of another format than its extension says, without an
+    area, or larger than the device can hold; if a position is not finite; if a skin, morph target or animation does not
+    fit the mesh; and if a scale is not positive.
     """
     file = _File(Path(path), mm_per_unit, size_mm, animation, simplify)
     looks = [usable_look(part, file.say) for part in file.contents.parts]
@@ -110,7 +112,7 @@ def load_file(
 
 
 class _File:
-    """A file that was read, on its way to bodies."""
+    """Turns the contents of a mesh file into bodies."""
 
     def __init__(
         self,
@@ -145,19 +147,19 @@ class _File:
             self.say(note)
 
     def say(self, note: str) -> None:
-        """Warn of something, once."""
+        """Warn with a note, unless the same note was given before."""
         if note not in self._said:
             self._said.add(note)
             warnings.warn(f"{self.path.name}: {note}", Note, stacklevel=2)
 
     def near_each_other(self, numbers: list[int]) -> list[list[int]]:
-        """Parts by number, in groups that can each be one body: what is very far apart cannot."""
+        """Group parts, by number, so that the parts of a group are near enough to each other for one body."""
         label = clusters(self._boxes[numbers])
         return [np.asarray(numbers)[label == one].tolist() for one in np.unique(label)]
 
     def bodies(self, groups: Sequence[tuple[Look, list[int]]]) -> tuple[LoadedMesh, ...]:
-        """A body for each look and the numbers of the parts that have it."""
-        found, why = [], "all faces are degenerate"
+        """Build a body for each pair of a material and the numbers of the parts that have it."""
+        usable, reason = [], "all faces are degenerate"
         for look, numbers in groups:
             name = look.name if len(groups) > 1 else ""
             soup, rig = self._soup(look, numbers)
@@ -166,18 +168,18 @@ class _File:
                 soup = soup.cut(mask)
             if not len(soup.faces):
                 self.say(f"{_named(name)}nothing is drawn where alpha is below {look.cutoff:g}, which is everywhere")
-                why = "its alpha mask leaves nothing"
+                reason = "its alpha mask leaves nothing"
                 continue
             body = self._body(look, name, soup, rig, self._splits(numbers))
             if body is not None:
-                found.append(body)
+                usable.append(body)
             elif len(groups) > 1:
                 self.say(f"{_named(name)}left out: it has no area")
-        if not found:
+        if not usable:
             count = sum(len(part.faces) for part in self.contents.parts)
-            why = f"all {count} faces are degenerate" if why.startswith("all") else why
-            raise InputError(f"{self.path}: the mesh has no area: {why}")
-        return tuple(found)
+            reason = f"all {count} faces are degenerate" if reason.startswith("all") else reason
+            raise InputError(f"{self.path}: the mesh has no area: {reason}")
+        return tuple(usable)
 
     def _soup(self, look: Look, numbers: Sequence[int]) -> tuple[Soup, Rig | None]:
         contents = self.contents
@@ -189,12 +191,12 @@ class _File:
         return soup, rig
 
     def _splits(self, numbers: Sequence[int]) -> bool:
-        """Whether vertices may be repeated for a reason: seams, hard edges, several parts, a format without indices."""
+        """Whether duplicate vertices are expected: at seams, hard edges or part borders, or without an index list."""
         parts = [self.contents.parts[number] for number in numbers]
         return self.contents.splits or len(parts) > 1 or any(part.uvs or part.normals is not None for part in parts)
 
     def _body(self, look: Look, name: str, soup: Soup, rig: Rig | None, splits: bool) -> LoadedMesh | None:
-        """A soup as a mesh with its textures and its motion; None where no face has an area, or nothing a size."""
+        """Build the body of a soup. Returns None if no face has an area, or if the mesh is smaller than MIN_SIZE."""
         centre, positions = centred(soup.positions * self.scale, soup.faces)
         faces, notes = soup.faces, []
         clip = None if self._clip is None or rig is None else self._clip.of(rig)

@@ -1,6 +1,6 @@
-"""The built-in scenes: one function each, made by code, standing for what the source papers rendered.
+"""The built-in scenes, one function each. They stand for the objects that the source papers render.
 
-Each takes the approximate vertex count of its mesh and raises InputError where a shape cannot have it.
+Each function takes the approximate vertex count of its mesh, and raises InputError for a count out of range.
 """
 
 from __future__ import annotations

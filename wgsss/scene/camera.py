@@ -16,7 +16,7 @@ from wgsss.scene.checks import Triple
 
 Matrix = npt.NDArray[np.float64]
 
-_STEEPEST = 89.999  # degrees above the horizontal; straight up, nothing would tell where the image's top is
+_STEEPEST = 89.999  # degrees above the horizontal: looking straight up or down, the top of the image is undefined
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Camera:
         checks.not_parallel(gaze, self.up, "up must not be parallel to the line from eye to target")
 
     def view(self) -> Matrix:
-        """(4, 4): world space, mm, to view space, mm; the camera looks down -z with y up."""
+        """Return the matrix (4, 4) from world space, mm, to view space, mm. The camera looks down -z with y up."""
         back = _unit(np.subtract(self.eye, self.target))
         right = _unit(np.cross(self.up, back))
         matrix = np.eye(4)
@@ -47,7 +47,7 @@ class _Camera:
         return matrix
 
     def _turned(self, degrees: float) -> Self:
-        """The eye moved about `up` through the target, counter-clockwise seen from the tip of `up` (Rodrigues)."""
+        """Rotate the eye about the axis `up` through the target, counter-clockwise seen from the tip of `up`."""
         axis, angle = _unit(np.asarray(self.up)), math.radians(degrees)
         arm = np.subtract(self.eye, self.target)
         turned = arm * math.cos(angle) + np.cross(axis, arm) * math.sin(angle)
@@ -56,11 +56,11 @@ class _Camera:
 
     @classmethod
     def orbit(cls, target: Triple, distance: float, azimuth: float, elevation: float, **rest: Any) -> Self:
-        """A camera on a sphere about the target.
+        """Create a camera on a sphere about the target.
 
         `distance` is in mm. `azimuth`, in degrees, is 0 on the +z side and 90 on the +x side; `elevation`, in degrees
-        above the horizontal, lies between -90 and 90, both excluded. `rest` are the camera's further fields.
-        Raises InputError naming what is out of range.
+        above the horizontal, lies between -90 and 90, both excluded. `rest` holds the other fields of the camera.
+        Raises InputError naming the argument that is out of range.
         """
         orbit = SimpleNamespace(target=target, distance=distance, azimuth=azimuth, elevation=elevation)
         checks.position(orbit, "target")
@@ -79,7 +79,7 @@ class PerspectiveCamera(_Camera):
     fov: float = 30.0
     """vertical angle of view, degrees"""
     turn: float = 0.0
-    """degrees per second by which the eye goes round the target, about `up`"""
+    """degrees per second by which the eye turns about the axis `up` through the target"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -87,7 +87,10 @@ class PerspectiveCamera(_Camera):
         checks.number(self, "turn", -checks.ANGLE, checks.ANGLE, "degrees per second")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:
-        """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""
+        """Return the matrix (4, 4) from view space to clip space.
+
+        `aspect` is width / height, `near` and `far` are in mm.
+        """
         _check_range(aspect, near, far, least=0.0)
         scale = 1 / math.tan(math.radians(self.fov) / 2)
         matrix = np.zeros((4, 4))
@@ -97,7 +100,7 @@ class PerspectiveCamera(_Camera):
         return matrix
 
     def at(self, time_s: float) -> PerspectiveCamera:
-        """The camera as it stands at a time in seconds, no longer turning."""
+        """Return the camera at a time in seconds, as one that does not turn."""
         return replace(self._turned(self.turn * time_s), turn=0.0) if self.turn else self
 
 
@@ -106,9 +109,9 @@ class OrthographicCamera(_Camera):
     """A camera with parallel rays."""
 
     height: float = 100.0
-    """what the image spans from bottom to top, mm"""
+    """height of the visible region, mm"""
     turn: float = 0.0
-    """degrees per second by which the eye goes round the target, about `up`"""
+    """degrees per second by which the eye turns about the axis `up` through the target"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -116,7 +119,10 @@ class OrthographicCamera(_Camera):
         checks.number(self, "turn", -checks.ANGLE, checks.ANGLE, "degrees per second")
 
     def projection(self, aspect: float, near: float, far: float) -> Matrix:
-        """(4, 4): view space to clip space. `aspect` is width / height, `near` and `far` are distances in mm."""
+        """Return the matrix (4, 4) from view space to clip space.
+
+        `aspect` is width / height, `near` and `far` are in mm.
+        """
         _check_range(aspect, near, far, least=-math.inf)
         matrix = np.eye(4)
         matrix[0, 0], matrix[1, 1] = 2 / (self.height * aspect), 2 / self.height
@@ -124,7 +130,7 @@ class OrthographicCamera(_Camera):
         return matrix
 
     def at(self, time_s: float) -> OrthographicCamera:
-        """The camera as it stands at a time in seconds, no longer turning."""
+        """Return the camera at a time in seconds, as one that does not turn."""
         return replace(self._turned(self.turn * time_s), turn=0.0) if self.turn else self
 
 

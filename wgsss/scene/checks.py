@@ -3,8 +3,8 @@
 Each function reads one field of a frozen dataclass that is being built, raises `InputError` naming the field, its unit
 and its range, and stores the value in its plain form (lists, as scene files give them, become tuples of float).
 
-No quantity is without limits: products of several must be numbers that single precision holds. The sun passes: a sphere
-of 7e11 mm, 1.5e14 mm away, of 2e7 W/(m^2 sr), or a point of 3e25 W/sr.
+Every quantity has limits, so that products of several stay within the range of single precision. The sun lies within
+them, as a sphere of radius 7e11 mm at a distance of 1.5e14 mm with 2e7 W/(m^2 sr), or as a point of 3e25 W/sr.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from wgsss.values import is_number
 Triple = tuple[float, float, float]
 
 COORDINATE = 1e15
-"""mm, of places, either sign: float32 holds its square"""
+"""Largest coordinate of a position, mm, of either sign. Its square is within the range of float32."""
 LENGTH = 1e13
-"""mm, of sizes"""
+"""Largest length, mm."""
 SMALLEST = 1e-6
-"""mm, of sizes"""
+"""Smallest length, mm."""
 ANGLE = 1e9
-"""degrees, or degrees per second, either sign"""
+"""Largest angle in degrees, or angular speed in degrees per second, of either sign."""
 SECONDS = 1e9
-"""of times, either sign"""
+"""Largest time, of either sign."""
 BRIGHTEST = 1e12
-"""W/(m^2 sr) of a radiance, W/m^2 of an irradiance: the sun has 2e7 and 1.4e3"""
+"""Largest radiance, W/(m^2 sr), and irradiance, W/m^2. Those of the sun are 2e7 and 1.4e3."""
 STRONGEST = 1e30
-"""W/sr of an intensity"""
+"""Largest intensity, W/sr."""
 
 
 def number(owner: object, field: str, low: float, high: float, unit: str = "", *, above: bool = False) -> None:
@@ -61,19 +61,19 @@ def triple(owner: object, field: str, low: float, high: float, unit: str = "") -
 
 
 def position(owner: object, field: str) -> None:
-    """Check that a field is a place, mm."""
+    """Check that a field is a position, mm."""
     triple(owner, field, -COORDINATE, COORDINATE, "mm")
 
 
 def direction(owner: object, field: str) -> None:
-    """Check that a field is a direction, of any length but zero."""
+    """Check that a field is a vector of nonzero length."""
     triple(owner, field, -COORDINATE, COORDINATE)
     if math.hypot(*getattr(owner, field)) < 1 / COORDINATE:
         raise InputError(f"{field} must not be the zero vector")
 
 
 def name(owner: object, field: str = "name") -> None:
-    """Check that a field is a text to call something by."""
+    """Check that a field is a name: text that is not empty."""
     value = getattr(owner, field)
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{field} must be text that is not empty, not {shown(value)}")
@@ -93,7 +93,7 @@ def time(time_s: float) -> None:
 
 
 def not_parallel(first: Iterable[float], second: Iterable[float], message: str) -> None:
-    """Raise `message` where two vectors, given as triples, do not span a plane."""
+    """Raise InputError with `message` if two vectors, given as triples, are parallel."""
     (a, b, c), (x, y, z) = first, second
     cross = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
     if cross <= 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):

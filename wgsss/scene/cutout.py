@@ -1,7 +1,7 @@
-"""Cutting a surface along the outline of an alpha mask.
+"""Cutting a mesh along the outline of an alpha mask.
 
-A leaf is often a few large triangles with a picture whose alpha says where the leaf is. It is cut once, when the file
-is read. The mesh then has the leaf's outline, and no method, shadow map or reference has to know of masks.
+A leaf is often modelled as a few large triangles with a texture whose alpha channel holds its outline. The mesh is cut
+along that outline once, when the file is read, so that methods, shadow maps and references need not handle masks.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from wgsss.scene.blend import Blend
 Array = npt.NDArray[Any]
 
 STEP = 1.5
-"""Length in texels at and below which edges near the outline are no longer split: stems of two texels then keep their
-width, while at twice the length they lose a sixth of it."""
+"""Edges near the outline are split until they are at most this many texels long. Stems two texels wide then keep their
+width. With twice the length they lose a sixth of it."""
 MOST_FACES = 400_000
-"""Faces beyond which no more edges are split, so that a large noisy mask cannot fill the memory."""
+"""Largest number of faces. Beyond it edges are not split, so that a large noisy mask cannot fill the memory."""
 _ROUNDS = 24  # of splitting in half: more than any texture needs
-_CLOSEST = 0.05  # share of an edge that the outline keeps away from its ends: less would leave slivers
+_CLOSEST = 0.05  # the outline keeps at least this share of an edge away from its ends, to avoid slivers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,22 +33,22 @@ class Mask:
     alpha: Array
     """float (H, W), 0 to 1, top row at v = 0"""
     cutoff: float
-    """the alpha below which there is no surface"""
+    """the surface is absent where alpha is below this value"""
     wrap: tuple[str, str]
-    """what is beyond 0 to 1, along u and v: "repeat", "clamp" or "mirror" """
+    """how the mask continues beyond 0 to 1 along u and v: "repeat", "clamp" or "mirror" """
 
     def height(self, uvs: Array) -> Array:
-        """Alpha less the cutoff at texture coordinates (N, 2), interpolated between texels."""
+        """Return alpha minus the cutoff at texture coordinates (N, 2), interpolated between texels: (N,)."""
         texels = [self._fold(uvs[:, i], self.alpha.shape[1 - i], self.wrap[i]) for i in range(2)]
         (left, right, across), (upper, lower, down) = texels
         top = self.alpha[upper, left] * (1 - across) + self.alpha[upper, right] * across
         bottom = self.alpha[lower, left] * (1 - across) + self.alpha[lower, right] * across
-        found: Array = top * (1 - down) + bottom * down - self.cutoff
-        return found
+        difference: Array = top * (1 - down) + bottom * down - self.cutoff
+        return difference
 
     @staticmethod
     def _fold(u: Array, size: int, wrap: str) -> tuple[Array, Array, Array]:
-        """The two texels on both sides of a coordinate, and how far the second counts."""
+        """Return the two texels around each coordinate, and the interpolation weight of the second."""
         first = np.floor(u * size - 0.5)
         share = u * size - 0.5 - first
         ends = []
@@ -63,8 +63,7 @@ class Mask:
 
     @cached_property
     def _counts(self) -> tuple[Array, tuple[int, int]]:
-        """How many texels at or above the cutoff are above and left of each texel of two by two periods of the mask,
-        and the size of a period."""
+        """A summed-area table of texels at or above the cutoff over two by two periods, and the size of a period."""
         inside = self.alpha >= self.cutoff
         for axis, wrap in ((1, self.wrap[0]), (0, self.wrap[1])):
             if wrap == "mirror":
@@ -75,7 +74,7 @@ class Mask:
         return count, (height, width)
 
     def straddled(self, low: Array, high: Array) -> Array:
-        """Whether boxes of texture coordinates (N, 2) hold texels on both sides of the cutoff."""
+        """Whether boxes of texture coordinates, with corners (N, 2), have texels on both sides of the cutoff."""
         count, (height, width) = self._counts
         spans = []
         for i, period in ((0, width), (1, height)):
@@ -95,10 +94,12 @@ class Mask:
 
 
 def cut(positions: Array, faces: Array, uvs: Array, mask: Mask) -> tuple[Blend, Array]:
-    """What is left of faces (F, 3) where the mask is at or above its cutoff: new vertices, and faces of these.
+    """Cut faces (F, 3) to the region where the mask is at or above its cutoff.
 
-    Edges near the outline are split until they are STEP texels long, then faces are clipped where alpha, linear along
-    an edge, meets the cutoff. Edges at the same positions (V, 3) are split alike, so that seams stay closed.
+    Edges near the outline are split until they are STEP texels long. Faces are then clipped where alpha, interpolated
+    along an edge, equals the cutoff. Edges at the same positions (V, 3) are split alike, so that seams stay closed.
+
+    Returns the new vertices as blends of the old ones, and the faces over them.
     """
     from scipy.sparse import csr_array, identity, vstack
 
@@ -145,22 +146,22 @@ def cut(positions: Array, faces: Array, uvs: Array, mask: Mask) -> tuple[Blend, 
 
 
 def _edges(faces: Array) -> tuple[Array, Array]:
-    """Distinct edges (E, 2), and for each face (F, 3) those from its first corner to its second, and so on."""
+    """Return the distinct edges (E, 2), and the edges (F, 3) of each face: first to second corner, and so on."""
     ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     distinct, index = _distinct(ends)
     return distinct, index.reshape(-1, 3)
 
 
 def _distinct(pairs: Array) -> tuple[Array, Array]:
-    """Distinct rows of pairs of whole numbers (N, 2), and for each row its index."""
+    """Return the distinct rows of pairs of integers (N, 2), and the index of each row among them."""
     stride = int(pairs.max(initial=0)) + 1
-    found, index = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
-    return np.stack(np.divmod(found, stride), axis=1), index.reshape(-1)
+    codes, index = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
+    return np.stack(np.divmod(codes, stride), axis=1), index.reshape(-1)
 
 
 def _refined(faces: Array, middle: Array) -> Array:
-    """Faces split at the middles (F, 3) of their edges, -1 where an edge stays."""
-    found = [faces[(middle < 0).all(axis=1)]]
+    """Split faces at the midpoints (F, 3) of their edges. -1 marks an edge that is not split."""
+    pieces = [faces[(middle < 0).all(axis=1)]]
     for turn in range(3):  # one pattern of each kind, turned to where its edges are
         (a, b, c), (ab, bc, ca) = np.roll(faces, -turn, axis=1).T, np.roll(middle, -turn, axis=1).T
         one = (ab >= 0) & (bc < 0) & (ca < 0)
@@ -169,29 +170,29 @@ def _refined(faces: Array, middle: Array) -> Array:
             (one, ((a, ab, c), (ab, b, c))),
             (two, ((ab, b, bc), (a, ab, bc), (a, bc, c))),
         ):
-            found += [np.stack(corner, axis=1)[chosen] for corner in corners]
+            pieces += [np.stack(corner, axis=1)[chosen] for corner in corners]
     whole = (middle >= 0).all(axis=1)
     (a, b, c), (ab, bc, ca) = faces[whole].T, middle[whole].T
-    found += [np.stack(corner, axis=1) for corner in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-    return np.concatenate(found)
+    pieces += [np.stack(corner, axis=1) for corner in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return np.concatenate(pieces)
 
 
 def _clipped(faces: Array, inside: Array, point: Array) -> Array:
-    """What is inside of each face, given the points (F, 3) where its edges cross the outline."""
+    """Clip faces to the inside, given the points (F, 3) at which their edges cross the outline."""
     corners = inside[faces]
-    found = [faces[corners.all(axis=1)]]
+    pieces = [faces[corners.all(axis=1)]]
     for turn in range(3):
         (a, b, c), (ab, _, ca) = np.roll(faces, -turn, axis=1).T, np.roll(point, -turn, axis=1).T
         a_in, b_in, c_in = np.roll(corners, -turn, axis=1).T
         alone = a_in & ~b_in & ~c_in
         missing = ~a_in & b_in & c_in
-        found.append(np.stack([a, ab, ca], axis=1)[alone])
-        found += [np.stack(corner, axis=1)[missing] for corner in ((ab, b, c), (ab, c, ca))]
-    return np.concatenate(found)
+        pieces.append(np.stack([a, ab, ca], axis=1)[alone])
+        pieces += [np.stack(corner, axis=1)[missing] for corner in ((ab, b, c), (ab, c, ca))]
+    return np.concatenate(pieces)
 
 
 def _compact(weights: Any, faces: Array) -> tuple[Blend, Array]:
-    """The vertices in use, as blends of those that went in, and the faces of them."""
+    """Drop unused vertices. Returns the others as blends of the original vertices, and the renumbered faces."""
     used, renumbered = np.unique(faces, return_inverse=True)
     rows = weights[used]
     rows.sum_duplicates()

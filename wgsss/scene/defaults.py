@@ -1,4 +1,4 @@
-"""What a mesh is shown with where nothing else is given: a material, lights, and a camera that frames it."""
+"""Defaults for a mesh without a scene: a material, lights, and a camera that frames it."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ DEFAULT_LIGHTS: tuple[Light, ...] = (
     DirectionalLight((-0.4, -0.3, 1.0), (1.6, 1.6, 1.6)),
     EnvironmentLight((0.1, 0.1, 0.1)),
 )
-POSES = 9  # of a moving object, which the camera is to have in view
-_MARGIN = 1.08  # of the width of the image, over what the objects fill
+POSES = 9  # of a moving object, all of which the camera shows
+_MARGIN = 1.08  # width of the image over the width of the objects in it
 
 
 def framing(
     objects: Iterable[Object], *, azimuth: float = 20.0, elevation: float = 10.0, fov: float = 30.0
 ) -> PerspectiveCamera:
-    """A camera with all objects in a square image, with a small margin, wherever they move to; angles in degrees.
+    """Create a camera that shows all objects in a square image, with a small margin, during their whole motion.
 
-    By default nearly from the front, but a little to the right and above: no symmetric thing looks flat.
+    Angles are in degrees. By default the camera looks from the front, a little from the right and from above, so that
+    symmetric objects do not look flat.
     """
     points = np.concatenate([pose.placed for thing in objects for pose in _poses(thing)])
     camera = PerspectiveCamera.orbit((0, 0, 0), 1.0, azimuth, elevation, fov=fov)
@@ -47,7 +48,7 @@ def framing(
 
 
 def _poses(thing: Object) -> list[Object]:
-    """An object as it is at times spread over its motion."""
+    """Return the object at POSES times spread evenly over the period of its motion."""
     if thing.motion is None:
         return [thing]
     return [thing.at(time_s) for time_s in np.linspace(0, thing.motion.period_s, POSES)]

@@ -1,4 +1,4 @@
-"""What a file holds, a mesh, a scene, a material or an environment image, and what of it is not used."""
+"""Description of a file: a mesh, a scene, a material or an environment image, and what of it wgsss does not use."""
 
 from __future__ import annotations
 
@@ -27,25 +27,26 @@ FORMATS = {".glb": "glTF", ".gltf": "glTF", ".obj": "OBJ", ".ply": "PLY", ".stl"
 
 
 def describe(path: Path) -> Described:
-    """What a file holds, as plain data. `notes` says, a line each, what is repaired, left out or taken otherwise.
+    """Describe the contents of a file as plain data.
 
-    Raises InputError for a file that cannot be read, and for one of another kind.
+    `notes` has one line for each thing that is repaired, left out or interpreted differently.
+    Raises InputError for a file that cannot be read, and for an unknown kind of file.
     """
     suffix = path.suffix.lower()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
         warnings.filterwarnings("always", category=Note)
         if suffix in SUFFIXES:
-            found = _mesh_file(path)
+            description = _mesh_file(path)
         elif suffix == ".toml":
-            found = _toml_file(path)
+            description = _toml_file(path)
         elif suffix in SKIES:
-            found = _sky(path)
+            description = _sky(path)
         else:
             kinds = ", ".join((*SUFFIXES, ".toml", *SKIES))
             raise InputError(f"{path}: not a kind of file that can be described ({kinds})")
-    found["notes"] = list(dict.fromkeys(one_line(warning.message) for warning in caught))
-    return found
+    description["notes"] = list(dict.fromkeys(one_line(warning.message) for warning in caught))
+    return description
 
 
 def _mesh_file(path: Path) -> Described:
@@ -133,7 +134,7 @@ def _size(things: Any) -> list[float]:
 
 
 def _reach(material: Material) -> float | None:
-    """Within how many mm all but 1 % of the light leaves; None where layers are too thin for diffusion."""
+    """Return the distance, mm, within which 99 % of the light leaves. None if layers are too thin for diffusion."""
     try:
         return float(f"{material.profile.range(0.01).max():.3g}")
     except InputError:

@@ -1,4 +1,4 @@
-"""The lights and the camera of a mesh file, as those of a scene."""
+"""Converts the lights and the camera of a mesh file to those of a scene."""
 
 from __future__ import annotations
 
@@ -21,28 +21,30 @@ NARROWEST, WIDEST = 0.05, 170.0  # degrees, of a camera's view
 
 
 def lights_of(file: LoadedFile) -> list[Light]:
-    """All lights of a file, lengths in mm. Raises InputError, naming the light, for one that no light can be.
+    """Convert all lights of a file to lights of a scene, with lengths in mm.
 
-    Where the file's unit is taken for another length than a metre, a point light's intensity is scaled, so that what
-    arrives at the mesh stays the same.
+    If the unit of the file is scaled to a length other than a metre, intensities of point lights are scaled too, so
+    that the irradiance on the mesh stays the same. Raises InputError naming a light whose values are out of range.
     """
     scale = file.bodies[0].mm_per_unit
-    found: list[Light] = []
+    lights: list[Light] = []
     for light in file.lights:
         try:
             if light.kind == "directional":
-                found.append(DirectionalLight(light.direction, light.power))
+                lights.append(DirectionalLight(light.direction, light.power))
             else:
                 intensity = np.asarray(light.power) * (scale / MM_PER_METRE) ** 2
-                found.append(PointLight(_triple(np.asarray(light.position) * scale), _triple(intensity)))
+                lights.append(PointLight(_triple(np.asarray(light.position) * scale), _triple(intensity)))
         except InputError as error:
             raise at(light.name, error) from None
-    return found
+    return lights
 
 
 def camera_in(file: LoadedFile, things: Sequence[Object]) -> Camera | None:
-    """The first camera of a file, lengths in mm. It looks at the point of its axis that is nearest to the middle of the
-    things, so that it turns about that."""
+    """Convert the first camera of a file, with lengths in mm. Returns None if there is none.
+
+    Its target is the point on its axis that is nearest to the middle of the objects, so that it turns about them.
+    """
     if not file.cameras:
         return None
     seen, scale = file.cameras[0], file.bodies[0].mm_per_unit
@@ -61,7 +63,7 @@ def camera_in(file: LoadedFile, things: Sequence[Object]) -> Camera | None:
 
 
 def note_unused(where: str, count: int, what: str, why: str) -> None:
-    """Warn that so many lights or cameras of a mesh file are not used, and why, or what would use them."""
+    """Warn that `count` lights or cameras of a mesh file are not used, with the reason or a hint."""
     if count:
         note = f"{where}: {counted(count, what)} of the file {'is' if count == 1 else 'are'} not used{why}"
         warnings.warn(note, Note, stacklevel=3)

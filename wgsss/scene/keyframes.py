@@ -1,4 +1,4 @@
-"""The channels of a glTF animation: keys over time, and what lies between them (glTF 2.0, appendix C)."""
+"""The channels of a glTF animation: key frames, and interpolation between them (glTF 2.0, appendix C)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PARALLEL = 1 - 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One property of one node, over time."""
+    """One animated property of one node."""
 
     node: int
     path: str
@@ -30,12 +30,12 @@ class Channel:
     interpolation: str
     """a key of INTERPOLATIONS"""
     times: Array
-    """float64 (K,), s, from 0 up, never falling"""
+    """float64 (K,), s, at least 0, in ascending order"""
     values: Array
     """float64 (K, 1, C), or of a cubic spline (K, 3, C)"""
 
     def at(self, time_s: float) -> Array:
-        """float64 (C,): the value at a time; before the first and after the last key, theirs."""
+        """Interpolate the value at a time: float64 (C,). Outside of the keys, return that of the first or last key."""
         value = self.values[:, len(self.values[0]) // 2]
         last = int(np.searchsorted(self.times, time_s, side="right")) - 1
         if last < 0 or last == len(self.times) - 1 or self.interpolation == "STEP":
@@ -57,12 +57,12 @@ class Channel:
         """Write the value at a time into a pose."""
         value = self.at(time_s)
         if self.path == "rotation" and not np.linalg.norm(value) > 1e-12:
-            return  # a spline through zero: there the rotation is none in particular
+            return  # a spline through zero, where the rotation is undefined
         getattr(pose, self.path)[self.node][:] = value
 
 
 def _slerp(start: Array, end: Array, t: float) -> Array:
-    """Between two quaternions, the shorter way round."""
+    """Interpolate between two quaternions on the shorter arc."""
     start, end = start / np.linalg.norm(start), end / np.linalg.norm(end)
     cosine = float(start @ end)
     if cosine < 0:

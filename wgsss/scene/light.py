@@ -18,7 +18,7 @@ class DirectionalLight:
     """A source so far away that its light arrives in parallel."""
 
     direction: Triple
-    """the direction in which light travels, of any length but zero"""
+    """the direction in which light travels, of any nonzero length"""
     irradiance: Triple
     """RGB, W/m^2, on a surface facing the light"""
 
@@ -29,7 +29,7 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class PointLight:
-    """A source without size; a surface facing it at a distance of d metres gets intensity / d^2 W/m^2."""
+    """A point source. A surface that faces it at a distance of d metres receives intensity / d^2 W/m^2."""
 
     position: Triple
     """mm"""
@@ -48,9 +48,9 @@ class RectLight:
     position: Triple
     """its centre, mm"""
     direction: Triple
-    """the normal of the side that emits, of any length but zero"""
+    """the normal of the emitting side, of any nonzero length"""
     up: Triple
-    """the direction along which height is measured; only its part across `direction` counts"""
+    """the direction along which height is measured; its component along `direction` is ignored"""
     width: float
     """mm"""
     height: float
@@ -58,7 +58,7 @@ class RectLight:
     radiance: Triple
     """RGB, W/(m^2 sr)"""
     samples: int = 16
-    """points on the rectangle that light and shadow are computed from"""
+    """number of points on the rectangle from which light and shadows are computed"""
 
     def __post_init__(self) -> None:
         checks.position(self, "position")
@@ -82,7 +82,7 @@ class SphereLight:
     radiance: Triple
     """RGB, W/(m^2 sr)"""
     samples: int = 16
-    """points on the sphere that light and shadow are computed from"""
+    """number of points on the sphere from which light and shadows are computed"""
 
     def __post_init__(self) -> None:
         checks.position(self, "position")
@@ -95,16 +95,16 @@ class SphereLight:
 class EnvironmentLight:
     """Light from all around, constant or from a latitude-longitude image.
 
-    Small bright regions of an image light the scene as directional lights do (`wgsss.bake.suns`).
+    Small bright regions of an image become directional lights (`wgsss.bake.suns`).
 
-    A direction (x, y, z) is found at u = 1/2 + atan2(x, -z) / 2 pi and v = acos(y) / pi: the middle of the image lies
+    A direction (x, y, z) lies at u = 1/2 + atan2(x, -z) / 2 pi and v = acos(y) / pi: the middle of the image lies
     along -z, its top along +y, and +x to the right of the middle.
     """
 
     radiance: Triple = (1.0, 1.0, 1.0)
-    """RGB, W/(m^2 sr); multiplies the image where there is one"""
+    """RGB, W/(m^2 sr); multiplies the image if there is one"""
     file: str | None = None
-    """a latitude-longitude image, or a cube that says so, .hdr or .exr (`wgsss.scene.images.read_sky`)"""
+    """a .hdr or .exr image: latitude-longitude, or a cube map marked as one (`wgsss.scene.images.read_sky`)"""
     rotation: float = 0.0
     """degrees by which the environment is turned about +y, counter-clockwise seen from above"""
 
@@ -115,7 +115,9 @@ class EnvironmentLight:
             raise InputError(f"file must be the path of a .hdr or .exr image, not {self.file!r}")
 
     def pixels(self) -> npt.NDArray[np.float32]:
-        """float32 (H, W, 3): radiance by latitude (top row +y) and longitude, before `rotation`; 1 x 1 without a file.
+        """Read the radiance by latitude (top row +y) and longitude, before `rotation`: float32 (H, W, 3).
+
+        Without a file it is 1 x 1.
 
         Negative values are clamped to zero. Raises InputError for a file that is missing, damaged or holds NaN, and
         for radiance above BRIGHTEST.

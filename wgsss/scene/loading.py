@@ -1,4 +1,4 @@
-"""Scenes by name, from scene files and from mesh files."""
+"""Loads scenes by name, from scene files and from mesh files."""
 
 from __future__ import annotations
 
@@ -33,16 +33,20 @@ def load_scene(
     file_camera: bool = False,
     file_lights: bool = False,
 ) -> Scene:
-    """A built-in scene by its name, a scene file (.toml), or a mesh file with default lights and a camera to frame it.
+    """Load a built-in scene by its name, a scene file (.toml), or a mesh file with default lights and a default camera.
 
-    `material`, a name, a material file or a Material, takes the place of every object's, whose textures stay. For a
-    mesh file, `size_mm` is the length of its longest side, `animation` the name of the one to play or "none", and
-    `simplify` the greatest number of faces of a body; `file_camera` and `file_lights` take the camera and the lights
-    that it holds in place of the default ones. For a built-in scene, `vertices` is about how many it has. `camera`,
-    and `lights` where there are any, take the place of the scene's own; they and the material may be tables with the
-    keys of a scene file.
+    Args:
+        material: replaces the material of every object; the textures of the objects stay. A name, a material file, a
+            table with the keys of [object.material], or a Material.
+        size_mm: of a mesh file: length of its longest side, mm.
+        animation: of a mesh file: name of the animation to play, or "none".
+        simplify: of a mesh file: largest number of faces of a body.
+        vertices: of a built-in scene: approximate number of vertices.
+        camera: replaces the camera of the scene. A Camera, or a table with the keys of [camera].
+        lights: replace the lights of the scene if there are any. Lights, or tables with the keys of [[light]].
+        file_camera, file_lights: of a mesh file: use its own camera or lights in place of the default ones.
 
-    Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
+    Raises InputError for an unknown name, and for anything wrong with a file, naming the file.
     """
     chosen = None if material is None else choose_material(material, Path(), "material")
     for_mesh = {"size_mm": size_mm, "animation": animation, "simplify": simplify}
@@ -56,10 +60,10 @@ def load_scene(
             raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
         scene = _of_mesh(path, chosen, for_mesh, file_camera, file_lights)
     else:
-        given = [key for key, value in for_mesh.items() if value is not None]
-        given += [key for key, on in (("file_camera", file_camera), ("file_lights", file_lights)) if on]
-        if given:
-            raise InputError(f"{name}: {given[0]} is for mesh files, and this is a scene")
+        mesh_options = [key for key, value in for_mesh.items() if value is not None]
+        mesh_options += [key for key, on in (("file_camera", file_camera), ("file_lights", file_lights)) if on]
+        if mesh_options:
+            raise InputError(f"{name}: {mesh_options[0]} is for mesh files, and this is a scene")
         scene = _of_name(name, path, chosen, vertices)
     return with_view(scene, camera, lights)
 
@@ -80,19 +84,21 @@ def _of_name(name: str, path: Path, chosen: Chosen | None, vertices: int | None)
     if vertices is not None and name not in SCENES:
         raise InputError(f"{name}: vertices is for built-in scenes; a file has those it has")
     scene: Scene = SCENES[name](vertices) if name in SCENES else read_scene(path)
-    return scene if chosen is None else _dressed(scene, chosen)
+    return scene if chosen is None else _with_chosen(scene, chosen)
 
 
 def _of_mesh(path: Path, chosen: Chosen | None, options: Table, file_camera: bool, file_lights: bool) -> Scene:
     file = load_file(path, **options)
     try:
-        return _seen(path, file, objects_of(file, chosen, path.name), file_camera, file_lights)
+        return _view_of_file(path, file, objects_of(file, chosen, path.name), file_camera, file_lights)
     except InputError as error:
         raise at(str(path), error) from None
 
 
-def _seen(path: Path, file: LoadedFile, things: tuple[Object, ...], file_camera: bool, file_lights: bool) -> Scene:
-    """The scene of a mesh file's objects, lit and seen by what it holds itself, where that is asked for."""
+def _view_of_file(
+    path: Path, file: LoadedFile, things: tuple[Object, ...], file_camera: bool, file_lights: bool
+) -> Scene:
+    """Build the scene of the objects of a mesh file, with its own camera and lights if requested."""
     lights: Sequence[Light] = DEFAULT_LIGHTS
     if file_lights:
         lights = lights_of(file)
@@ -114,29 +120,29 @@ def _seen(path: Path, file: LoadedFile, things: tuple[Object, ...], file_camera:
 
 
 def with_material(scene: Scene, material: str | Path | Table | Material) -> Scene:
-    """The scene with all objects of another material, as of `load_scene`; their textures stay."""
-    return _dressed(scene, choose_material(material, Path(), "material"))
+    """Replace the material of all objects, as `load_scene` does. Their textures stay."""
+    return _with_chosen(scene, choose_material(material, Path(), "material"))
 
 
 def with_view(scene: Scene, camera: Table | Camera | None, lights: Sequence[Table | Light]) -> Scene:
-    """The scene with another camera and other lights, as of `load_scene`, where there are any."""
+    """Replace the camera and the lights if any are given, as `load_scene` does."""
     if isinstance(camera, dict):
         camera = camera_of(camera, "camera")
-    found = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
-    return replace(scene, camera=camera or scene.camera, lights=tuple(found) or scene.lights)
+    replaced = [light_of(light, "light", Path()) if isinstance(light, dict) else light for light in lights]
+    return replace(scene, camera=camera or scene.camera, lights=tuple(replaced) or scene.lights)
 
 
-def _dressed(scene: Scene, chosen: Chosen) -> Scene:
-    return replace(scene, objects=tuple(_in(chosen, o) for o in scene.objects))
+def _with_chosen(scene: Scene, chosen: Chosen) -> Scene:
+    return replace(scene, objects=tuple(_apply(chosen, o) for o in scene.objects))
 
 
-def _in(chosen: Chosen, thing: Object) -> Object:
+def _apply(chosen: Chosen, thing: Object) -> Object:
     return replace(thing, material=chosen.on(thing.material.maps, thing.mesh.corner_colors is not None))
 
 
 def load_material(name_or_path: str | Path) -> Material:
-    """A measured material by its name, or the one of a material file (.toml), which holds what [object.material] would.
+    """Load a measured material by its name, or a material file (.toml) with the keys of [object.material].
 
-    Raises InputError for a name that is not known, and for whatever is wrong with a file, naming the file.
+    Raises InputError for an unknown name, and for anything wrong with a file, naming the file.
     """
     return choose_material(name_or_path, Path()).material

@@ -1,4 +1,4 @@
-"""Materials: how light is scattered and absorbed below a surface, and what the surface itself does."""
+"""Materials: scattering and absorption below a surface, and reflection at the surface."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from wgsss.text import shortened
 
 WRAPS = ("repeat", "clamp", "mirror")  # in the order of wgsl/mesh.wgsl
 SLOTS = ("base_color", "normal", "specular")
-"""the textures there are"""
+"""Kinds of textures."""
 STEEPEST = 100.0
-"""scale of a normal map's slopes, beyond which all of them are vertical"""
+"""Largest scale of the slopes of a normal map: beyond it all slopes are vertical."""
 
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """Textures over a mesh's own texture coordinates, top row at v = 0; None where there is none."""
+    """Textures over the texture coordinates of a mesh, top row at v = 0. None means no texture."""
 
     base_color: npt.NDArray[Any] | None = None
     """uint8 (H, W, 3), sRGB"""
@@ -35,13 +35,14 @@ class Maps:
     specular: npt.NDArray[Any] | None = None
     """uint8 (H, W), linear"""
     wrap: tuple[str, str] = ("repeat", "repeat")
-    """what they show beyond 0 to 1, along u and v: each one of WRAPS"""
+    """how textures continue beyond 0 to 1 along u and v: each one of WRAPS"""
     nearest: bool = False
-    """whether they are not interpolated between texels"""
+    """whether textures are sampled without interpolation"""
     normal_scale: float = 1.0
-    """of the slopes of the normal map"""
+    """scale of the slopes of the normal map"""
     tint: Triple = (1.0, 1.0, 1.0)
-    """linear, of the mesh's own material: part of the base colour of whatever material the mesh gets"""
+    """linear base colour of the material in the file; it also multiplies the base colour of a material that
+    replaces it"""
 
     def __post_init__(self) -> None:
         if len(self.wrap) != 2 or any(wrap not in WRAPS for wrap in self.wrap):
@@ -60,9 +61,9 @@ class Maps:
 class Material:
     """A translucent medium below a rough dielectric surface.
 
-    The medium is given in one of four ways: by the coefficients of a homogeneous one (sigma_a and sigma_s_prime), as
-    layers of such, or by its profile alone, a sum of Gaussians or a table.
-    Raises InputError naming the field that is out of range, and for the medium the material and the channel.
+    The medium is given in one of four ways: by the coefficients of a homogeneous medium (sigma_a and sigma_s_prime), by
+    layers of such media, or by its diffusion profile as a sum of Gaussians or as a table.
+    Raises InputError naming the field that is out of range, and for the medium also the material and the channel.
     """
 
     name: str
@@ -71,7 +72,7 @@ class Material:
     sigma_s_prime: Triple | None = None
     """reduced scattering, 1/mm"""
     eta: float = 1.3
-    """index of refraction relative to air; of the top layer, where there are layers"""
+    """index of refraction relative to air; with layers, that of the top layer"""
     layers: tuple[Layer, ...] | None = None
     """layers from the top down, in place of the coefficients"""
     gaussians: SumOfGaussians | None = None
@@ -83,11 +84,11 @@ class Material:
     specular: float = 1.0
     """scale of the GGX lobe, 0 to 1"""
     base_color: Triple = (1.0, 1.0, 1.0)
-    """linear; multiplies what the profile returns"""
+    """linear; multiplies the light that the profile returns"""
     color_after: float = 1.0
     """share of the base colour applied after diffusion, col(x_o)^a col(x_i)^(1 - a) (Mikkelsen 2009, section 3.5)"""
     transport: Triple | None = None
-    """distortion, power and ambient of light that has crossed the material, in place of barre11's knobs"""
+    """distortion, power and ambient of transmitted light, which replace the knobs of barre11"""
     maps: Maps = field(default_factory=Maps)
 
     def __post_init__(self) -> None:
@@ -129,16 +130,16 @@ class Material:
 
     @cached_property
     def stack(self) -> tuple[Layer, ...] | None:
-        """The medium as layers: one without end where it is homogeneous, None where only its profile is known."""
+        """The medium as layers: one infinite layer if it is homogeneous, None if only its profile is known."""
         if self.sigma_a is None or self.sigma_s_prime is None:
             return self.layers
         return (Layer(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta),)
 
     @cached_property
     def profile(self) -> Profile:
-        """The diffusion profile R(r), 1/mm^2 per channel: the dipole's, where the medium is homogeneous.
+        """The diffusion profile R(r), 1/mm^2 per channel. A homogeneous medium has that of the dipole.
 
-        Raises InputError for layers too thin for diffusion, through which photons can still be followed.
+        Raises InputError for layers too thin for diffusion theory. Photons can be traced through those too.
         """
         if self.gaussians is not None:
             return self.gaussians
@@ -154,7 +155,7 @@ class Material:
 
 
 IN_PLACE = ("layers", "gaussians", "table")
-"""what can give the medium in place of its coefficients"""
+"""Fields that can define the medium in place of its coefficients."""
 
 # Measured by Jensen et al. 2001, "A Practical Model for Subsurface Light Transport", figure 5: sigma_s' and sigma_a,
 # 1/mm. Marble alone has an eta of 1.5: only so does the dipole's total give the diffuse reflectance of the same table.
@@ -183,11 +184,11 @@ MATERIALS["skin"] = Material("skin", gaussians=SKIN_GAUSSIANS, eta=1.4, base_col
 
 
 def material(name: str) -> Material:
-    """The measured material of that name, whatever its case, spaces, hyphens and underscores ("Whole Milk").
+    """Return a measured material by name. Case, spaces, hyphens and underscores are ignored ("Whole Milk").
 
-    Raises InputError for a name that is not known, suggesting the nearest one.
+    Raises InputError for an unknown name, with the most similar one.
     """
-    found = MATERIALS.get(re.sub(r"[\s_-]+", "", name).lower())
-    if found is None:
+    measured = MATERIALS.get(re.sub(r"[\s_-]+", "", name).lower())
+    if measured is None:
         raise unknown("material", name, MATERIALS)
-    return found
+    return measured

@@ -1,4 +1,4 @@
-"""Materials by name, from TOML tables and from material files, and the textures they bring or take over from a mesh."""
+"""Loads materials by name, from TOML tables and from material files, and combines them with the textures of a mesh."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from wgsss.userfiles import path_from
 
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 _INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")
-"""what gives the coefficients through the dipole"""
+"""Keys from which the coefficients are computed by inverting the dipole."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A material that somebody asked for."""
+    """A material that the user chose."""
 
     material: Material
     coloured: bool
-    """whether its base colour was asked for too, and does not merely come with a measured material"""
+    """whether the user also chose its base colour, which otherwise comes with a measured material"""
 
     def on(self, maps: Maps, coloured_vertices: bool = False) -> Material:
-        """The material on a mesh with these textures, which serve where it has none of its own.
+        """Return the material for a mesh with these textures. A texture of the material replaces that of the mesh.
 
-        A colour that varies over the mesh, by a texture or by its vertices, is the base colour: it takes the place of a
-        constant one, unless that was asked for to tint it. So is a constant colour of the mesh (`Maps.tint`), unless
-        the material has one of its own.
+        A colour that varies over the mesh, by a texture or by vertex colours, becomes the base colour and replaces the
+        constant base colour of the material. If the user chose that colour, it tints the varying one instead. A
+        constant colour of the mesh (`Maps.tint`) also becomes the base colour, unless the material has its own.
         """
         own = self.material.maps
         both = replace(maps, **{slot: getattr(own, slot) for slot in SLOTS if getattr(own, slot) is not None})
@@ -50,7 +50,7 @@ class Chosen:
 
 
 def choose_material(value: Any, folder: Path, where: str = "") -> Chosen:
-    """A material from its name, from a file relative to `folder`, from a table of a TOML file, or from itself."""
+    """Load a material by its name, from a file relative to `folder`, or from a table. A Material is used as it is."""
     if isinstance(value, Material):
         return Chosen(value, coloured=value not in MATERIALS.values())
     if isinstance(value, dict):
@@ -111,7 +111,7 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
 
 
 def _inverted(table: tables.Table, eta: Any, where: str) -> tables.Table:
-    """The coefficients of the medium with a total reflectance and a mean free path, under the dipole's boundary."""
+    """Compute the coefficients of a medium from its total reflectance and mean free path by inverting the dipole."""
     if any(key in table for key in (*_COEFFICIENTS, *IN_PLACE)):
         raise InputError(
             f"{where}: reflectance and a mean free path stand in place of another medium: give one or the other"

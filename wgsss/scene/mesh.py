@@ -1,4 +1,4 @@
-"""Triangle meshes: welded positions for topology, and texture coordinates and normals per corner beside them."""
+"""Triangle meshes with welded positions, and with texture coordinates, normals and colours per corner."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MIN_SIZE, MAX_SIZE = 1e-6, 1e9  # of a mesh's longest side, mm
 class Mesh:
     """A triangle mesh in millimetres, counter-clockwise seen from outside.
 
-    `positions` are welded: no two are equal, so that edges and neighbours cross texture seams. What a seam or a hard
-    edge splits, texture coordinates and normals, is kept per corner of a face. The arrays are held read-only.
-    Raises InputError where shapes do not fit, a number is not finite or a face names a vertex that is not there.
+    `positions` are welded: no two are equal, so that the topology is connected across texture seams and hard edges.
+    Texture coordinates, normals and colours, which may differ there, are stored per corner of a face. The arrays are
+    read-only. Raises InputError if a shape does not fit, a number is not finite or a face index is out of range.
     """
 
     positions: Array
@@ -37,7 +37,7 @@ class Mesh:
     corner_colors: Array | None = None
     """float32 (F, 3, 3), linear, multiply the base colour, or None"""
     shrunk: bool = False
-    """whether a motion has made it smaller than MIN_SIZE, so that nothing of it is seen"""
+    """whether a motion has made the mesh smaller than MIN_SIZE, and so invisible"""
 
     def __post_init__(self) -> None:
         self._hold("positions", np.float32, (None, 3))
@@ -70,13 +70,13 @@ class Mesh:
 
     @cached_property
     def face_normals(self) -> Array:
-        """float64 (F, 3): normals as long as twice the face's area, mm^2."""
+        """float64 (F, 3): face normals whose length is twice the area of the face, mm^2."""
         a, b, c = (self.positions[self.faces[:, i]].astype(np.float64) for i in range(3))
         return np.cross(b - a, c - a)
 
     @cached_property
     def normals(self) -> Array:
-        """float32 (V, 3): smooth unit normals, the mean of the faces around weighted by their angle at the vertex."""
+        """float32 (V, 3): smooth unit normals. Each is the mean of the adjacent faces, weighted by their angle."""
         corners = self.positions.astype(np.float64)[self.faces]
         size = np.linalg.norm(self.face_normals, axis=1, keepdims=True)
         unit = np.divide(self.face_normals, size, out=np.zeros_like(self.face_normals), where=size > 0)
@@ -87,13 +87,14 @@ class Mesh:
             for axis in range(3):
                 total[:, axis] += np.bincount(self.faces[:, i], angle * unit[:, axis], len(total))
         length = np.linalg.norm(total, axis=1, keepdims=True)
-        # The fan of a folded sheet may cancel out; any direction is as good there, but it must be a unit vector.
+        # At a fold the sum may be zero. Any unit vector will do there.
         up = np.broadcast_to((0.0, 1.0, 0.0), total.shape)
         return np.where(length > 1e-12, total / np.maximum(length, 1e-12), up).astype(np.float32)
 
     @cached_property
     def shading_normals(self) -> Array:
-        """float32 (F, 3, 3): the unit normal at each corner, from the file where it has hard edges, else smooth."""
+        """float32 (F, 3, 3): the unit normals at the corners: `corner_normals` if there are any, else the smooth
+        ones."""
         return self.normals[self.faces] if self.corner_normals is None else self.corner_normals
 
     @cached_property
@@ -107,9 +108,9 @@ class Mesh:
         return np.stack([self.positions.min(axis=0), self.positions.max(axis=0)])
 
     def deformed(self, positions: Array) -> Mesh:
-        """The same topology and texture coordinates at other positions (V, 3), mm, with smooth normals.
+        """Return the mesh with other positions (V, 3), mm, and smooth normals.
 
-        A part that is hidden for a while is often scaled to nothing: it becomes a mesh that is `shrunk`.
+        Animations often hide a part by scaling it to zero. The result is then a mesh that is `shrunk`.
         """
         if np.shape(positions) != self.positions.shape:
             raise InputError(f"{self.name}: a deformation must keep {len(self.positions)} positions")

@@ -1,4 +1,4 @@
-"""The bodies of a mesh file as objects of a scene: each placed, and in a material whose reach suits its size."""
+"""Turns the bodies of a mesh file into objects of a scene, and checks that their size suits their material."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from wgsss.scene.material import Material
 from wgsss.scene.materialfile import Chosen
 from wgsss.scene.scene import Motion, Object
 
-# Sizes of a mesh, in distances that light spreads below its surface, beyond which a wrong unit is likely: larger than
-# the greatest it looks opaque, smaller than the least it glows as a whole. At FITTING diffusion is seen.
+# Sizes of a mesh over the distance that light spreads below its surface. Above GREATEST the mesh looks opaque, below
+# LEAST it glows as a whole: both suggest a wrong unit. At FITTING diffusion is visible.
 LEAST, GREATEST, FITTING = 0.1, 1000.0, 10.0
 GLTF_ETA = 1.5
 """The index of refraction of a glTF material that names none (glTF 2.0, KHR_materials_ior)."""
@@ -33,24 +33,24 @@ def objects_of(
     rotate: Triple = (0.0, 0.0, 0.0),
     motion: Motion | None = None,
 ) -> tuple[Object, ...]:
-    """An object for each body of a file, in the chosen material, or without one in the file's own.
+    """Create an object for each body of a file, with the chosen material or, if it is None, with that of the file.
 
-    Warns, naming `where`, of a mesh that is very large or small beside the distance that light spreads in it.
+    Warns, naming `where`, if the mesh is very large or small compared with the distance that light spreads in it.
     """
-    found = []
+    objects = []
     for body in file.bodies:
         material = own_material(body) if chosen is None else chosen.on(body.maps, body.mesh.corner_colors is not None)
         thing = Object(body.mesh, material, translate, rotate, motion or body.motion)
         if any(body.translate):
             moved = thing.matrix @ [*body.translate, 1.0]
             thing = replace(thing, translate=tuple(moved[:3].tolist()))
-        found.append(thing)
-    _check_size(found, file, chosen, where)
-    return tuple(found)
+        objects.append(thing)
+    _check_size(objects, file, chosen, where)
+    return tuple(objects)
 
 
 def own_material(body: LoadedMesh) -> Material:
-    """What the file says of a body's material, over the default one."""
+    """Return the default material with the properties that the file gives for a body."""
     look, material = body.look, DEFAULT_MATERIAL
     values: dict[str, Any] = {}
     if look.roughness is not None:
@@ -77,11 +77,11 @@ def _per_mm(sigma: Triple, mm_per_unit: float) -> Triple:
     return red, green, blue
 
 
-def _check_size(found: list[Object], file: LoadedFile, chosen: Chosen | None, where: str) -> None:
-    """Warn of the first material in whose light the mesh is too large or too small to show diffusion."""
-    points = np.concatenate([thing.placed for thing in found])
+def _check_size(objects: list[Object], file: LoadedFile, chosen: Chosen | None, where: str) -> None:
+    """Warn about the first material for which the mesh is too large or too small to show diffusion."""
+    points = np.concatenate([thing.placed for thing in objects])
     side = float(np.ptp(points, axis=0).max())
-    for thing, body in zip(found, file.bodies, strict=True):
+    for thing, body in zip(objects, file.bodies, strict=True):
         material = thing.material
         try:
             reach = float(material.profile.range(0.01).max())

@@ -1,4 +1,4 @@
-"""Motions: how a body's shape changes over time, as functions of its rest pose."""
+"""Motions: functions that deform the rest pose of a mesh over time."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from wgsss.scene import checks
 
 @dataclass(frozen=True)
 class BendAndSwell:
-    """A body along y that stands on y = 0, sways from side to side and lets a swelling run up along it.
+    """A motion of a body along y that stands on y = 0: it sways from side to side while swellings run up along it.
 
-    At time 0, and after every period, it is in its rest pose.
+    At time 0, and after every period, the body is in its rest pose.
     """
 
     length: float = 60.0
@@ -23,9 +23,9 @@ class BendAndSwell:
     bend: float = 75.0
     """greatest angle between the top and the foot, degrees, towards +x and -x in turn"""
     swell: float = 0.3
-    """greatest change of the radius, as a share of it"""
+    """largest relative change of the radius"""
     waves: float = 1.0
-    """swellings along the body at a time"""
+    """number of swellings along the body"""
     period_s: float = 4.0
     """seconds"""
 
@@ -37,7 +37,7 @@ class BendAndSwell:
         checks.number(self, "period_s", 1e-3, checks.SECONDS, "seconds")
 
     def apply(self, positions: npt.ArrayLike, time_s: float) -> npt.NDArray[np.float32]:
-        """Positions (V,3), mm, at a time in seconds, of positions (V,3) at rest."""
+        """Deform positions (V, 3) at rest to those at a time in seconds: float32 (V, 3), mm."""
         rest = np.asarray(positions, dtype=np.float64)
         phase = 2 * math.pi * ((time_s / self.period_s) % 1.0)
         x, y, z = rest.T

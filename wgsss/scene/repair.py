@@ -1,4 +1,4 @@
-"""Making one clean surface of the triangles of a file: welded, no face degenerate, wound outwards, holes counted."""
+"""Repair of the triangles of a file: weld vertices, drop degenerate faces, orient faces outwards, count holes."""
 
 from __future__ import annotations
 
@@ -10,43 +10,46 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-# Below this height over length, the rounding of float32 positions decides which way a triangle faces.
+# Below this ratio of height to length, rounding of float32 positions decides which way a triangle faces.
 SLIVER = 1e-6
-# Share of its area by which a surface may fail to close (the length of its summed normals) and still have an inside.
+# A surface with holes still has an inside if the length of its summed area vectors is below this share of its area.
 OPENING = 0.05
 
 
 @dataclass(frozen=True)
 class Repaired:
-    """A surface, and how it came from the faces that went in."""
+    """A repaired surface, and how it relates to the original faces."""
 
     positions: Array
-    """float32 (V, 3), no two equal, all used"""
+    """float32 (V, 3), all different and all used"""
     faces: Array
     """int32 (F, 3)"""
     kept: Array
-    """int (F,): which of the faces that went in each one was"""
+    """int (F,): the index of each face among the original faces"""
     flipped: Array
-    """bool (F,): where the order of the corners was reversed"""
+    """bool (F,): whether the order of the corners was reversed"""
     welded: int
-    """positions that were equal to an earlier one"""
+    """number of positions that were equal to an earlier one"""
     notes: tuple[str, ...]
-    """what was repaired or found, counted, welding apart"""
+    """one text for each kind of repair or defect, with its count; without welding"""
 
     def corners(self, values: Array) -> Array:
-        """Values of the corners (F, 3, k) of the faces that went in, for the faces that are left."""
+        """Select the values (F, 3, k) of the corners of the repaired faces from those of the original faces."""
         values = values[self.kept]
         return np.where(self.flipped[:, None, None], values[:, ::-1], values)
 
     def sources(self, faces: Array) -> Array:
-        """For each position the index (V,) of one that went in, the faces that went in being (N, 3)."""
-        found = np.empty(len(self.positions), np.int64)
-        found[self.faces] = self.corners(faces[..., None])[..., 0]
-        return found
+        """Return, for each position, the index (V,) of an original position, given the original faces (N, 3)."""
+        indices = np.empty(len(self.positions), np.int64)
+        indices[self.faces] = self.corners(faces[..., None])[..., 0]
+        return indices
 
 
 def weld(positions: Array) -> tuple[Array, Array]:
-    """Equal rows of float32 (V, 3) made one: those left, in order of appearance, and for each row its new index."""
+    """Merge equal rows of float32 (V, 3).
+
+    Returns the distinct rows in order of appearance, and the new index of each.
+    """
     bits = np.ascontiguousarray(positions + np.float32(0), np.float32).view(np.uint32).astype(np.uint64)  # -0 is 0
     pair = np.unique((bits[:, 0] << np.uint64(32)) | bits[:, 1], return_inverse=True)[1].astype(np.uint64)
     _, first, inverse = np.unique((pair << np.uint64(32)) | bits[:, 2], return_index=True, return_inverse=True)
@@ -57,7 +60,7 @@ def weld(positions: Array) -> tuple[Array, Array]:
 
 
 def repair(positions: Array, faces: Array) -> Repaired:
-    """Weld, drop and orient the faces (F, 3) over float32 positions (V, 3). It may be that no face is left."""
+    """Weld, clean and orient the faces (F, 3) over float32 positions (V, 3). The result may have no faces."""
     given = len(positions)
     used = np.zeros(given, bool)
     used[faces] = True
@@ -92,7 +95,7 @@ def repair(positions: Array, faces: Array) -> Repaired:
 
 
 class _Edges:
-    """Which faces meet at which edges."""
+    """The edges of a mesh, and the faces that meet at them."""
 
     def __init__(self, faces: Array) -> None:
         start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -109,7 +112,7 @@ class _Edges:
         self.agree = start[order[twice]] != start[order[twice + 1]]
 
     def holes(self) -> int:
-        """The number of connected boundaries."""
+        """Count the connected boundaries."""
         if not len(self.boundary):
             return 0
         vertices, ends = np.unique(self.boundary, return_inverse=True)
@@ -136,7 +139,7 @@ def _degenerate(positions: Array, faces: Array) -> Array:
 
 
 def _first_of_equal(faces: Array, vertices: int) -> Array:
-    """The faces that do not repeat an earlier one of the same corners and winding, in order."""
+    """Return the indices of faces that do not repeat an earlier face with the same corners and winding."""
     least = faces.argmin(axis=1)[:, None]
     a, b, c = (np.take_along_axis(faces, (least + i) % 3, axis=1)[:, 0] for i in range(3))
     ab = np.unique(a * vertices + b, return_inverse=True)[1]
@@ -144,10 +147,11 @@ def _first_of_equal(faces: Array, vertices: int) -> Array:
 
 
 def _disagreeing(edges: _Edges, positions: Array, faces: Array) -> Array:
-    """The faces to turn over so that neighbours agree on the outside, fewest by area in each connected piece.
+    """Choose the faces to flip so that neighbouring faces agree on the outside: in each piece those of less total area.
 
-    Each face becomes two nodes, as it is and turned over; neighbours link the states in which they agree. A piece falls
-    into two components, its two orientations, unless it is one-sided like a Moebius strip, which is left as it is.
+    Each face becomes two graph nodes, one as it is and one flipped. Neighbours link the states in which they agree. A
+    piece then forms two components, its two orientations. A one-sided piece like a Moebius strip forms only one, and
+    is left as it is.
     """
     count = len(faces)
     if edges.agree.all():
@@ -159,14 +163,14 @@ def _disagreeing(edges: _Edges, positions: Array, faces: Array) -> Array:
     ).reshape(2, count)
     area = np.linalg.norm(_area_vectors(positions, faces), axis=1)
     for_it = np.bincount(as_is, area, 2 * count)
-    # Of two halves alike either will do, so long as they agree.
+    # Where both orientations have the same area, choose one consistently.
     tied = (for_it[as_is] == for_it[turned]) & (as_is > turned)
     minority: Array = (as_is != turned) & ((for_it[as_is] < for_it[turned]) | tied)
     return minority
 
 
 def _inside_out(edges: _Edges, positions: Array, faces: Array) -> Array:
-    """The faces of pieces that are closed, or but for small holes, and enclose a negative volume; cavities stay."""
+    """Return the faces of closed pieces that enclose a negative volume. Small holes are allowed; cavities stay."""
     piece = _components(len(faces), *edges.pairs)
     pieces = int(piece.max()) + 1
     corners = positions[faces].astype(np.float64)
@@ -181,7 +185,7 @@ def _inside_out(edges: _Edges, positions: Array, faces: Array) -> Array:
     vectors = _area_vectors(positions, faces)
     area = total(np.linalg.norm(vectors, axis=1))
     opening = np.linalg.norm([total(vectors[:, i]) for i in range(3)], axis=0)
-    # From the piece's own middle, small holes change the volume little.
+    # Measured from the centre of the piece, small holes change the volume little.
     middle = ((low + high) / 2)[piece]
     volume = total(np.einsum("ij,ij->i", corners[:, 0] - middle, vectors) / 3)
     negative = (opening <= OPENING * area) & (volume < -1e-4 * area**1.5)
@@ -203,7 +207,7 @@ def _note(notes: list[str], count: int, what: str, did: str) -> None:
 
 
 def counted(count: int, what: str) -> str:
-    """ "1 vertex", "2 vertices", "3 meshes", "4 faces"."""
+    """Format a count with its noun: "1 vertex", "2 vertices", "3 meshes", "4 faces"."""
     if count == 1:
         return f"1 {what}"
     if what.endswith("sh"):

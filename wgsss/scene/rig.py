@@ -1,6 +1,6 @@
-"""What moves the vertices of a glTF file: its nodes, the skins that hang on them, and its morph targets.
+"""The rig of a glTF file: the nodes, skins and morph targets that move its vertices.
 
-Equations and rules are those of the glTF 2.0 specification, sections 3.5 (nodes) and 3.7 (skins, morph targets).
+It follows the glTF 2.0 specification, sections 3.5 (nodes) and 3.7 (skins, morph targets).
 """
 
 from __future__ import annotations
@@ -20,52 +20,52 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How N nodes stand to their parents, and how far their meshes are morphed."""
+    """The transforms of N nodes relative to their parents, and the weights of their morph targets."""
 
     translation: Array
-    """float64 (N, 3), the file's units"""
+    """float64 (N, 3), in the unit of the file"""
     rotation: Array
-    """float64 (N, 4): quaternions x, y, z, w of any length above 0"""
+    """float64 (N, 4): quaternions x, y, z, w of any nonzero length"""
     scale: Array
     """float64 (N, 3)"""
     weights: tuple[Array, ...]
-    """float64 (T,) of each node: how much of each of the T morph targets of its mesh is added"""
+    """float64 (T,) for each node: the weights of the T morph targets of its mesh"""
 
     def copy(self) -> Pose:
-        """One whose arrays may be written to."""
+        """Copy the pose, so that its arrays can be changed."""
         return Pose(self.translation.copy(), self.rotation.copy(), self.scale.copy(), tuple(map(np.copy, self.weights)))
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """The hierarchy of N nodes. Raises InputError where nodes are their own ancestors."""
+    """The hierarchy of N nodes. Raises InputError if a node is its own ancestor."""
 
     parents: Array
     """int (N,); -1 for roots"""
     fixed: dict[int, Array]
-    """float64 (4, 4) of those nodes that are given by a matrix, which takes the place of what a pose says of them"""
+    """float64 (4, 4) for nodes that are defined by a matrix, which replaces their transform in any pose"""
     rest: Pose
 
     @cached_property
     def levels(self) -> list[Array]:
-        """The nodes in order of their depth: int (n,) of those of each depth, beginning with the roots."""
+        """The indices int (n,) of the nodes at each depth, starting with the roots."""
         order = np.argsort(self.parents, kind="stable")
         first = np.searchsorted(self.parents[order], np.arange(len(self.parents) + 1))
-        found, level, left = [], np.flatnonzero(self.parents < 0), len(self.parents)
+        by_depth, level, left = [], np.flatnonzero(self.parents < 0), len(self.parents)
         while len(level):
-            found.append(level)
+            by_depth.append(level)
             left -= len(level)
             level = np.concatenate([order[first[node] : first[node + 1]] for node in level])
         if left:
-            ring = self._ring(np.setdiff1d(np.arange(len(self.parents)), np.concatenate([*found, level]))[0])
+            ring = self._ring(np.setdiff1d(np.arange(len(self.parents)), np.concatenate([*by_depth, level]))[0])
             raise InputError(f"node {ring} is its own ancestor")
-        return found
+        return by_depth
 
     def __post_init__(self) -> None:
         _ = self.levels
 
     def _ring(self, node: int) -> int:
-        """The first node of the ring above a node."""
+        """Return the smallest index in the cycle of ancestors above a node."""
         for _ in range(len(self.parents)):
             node = int(self.parents[node])
         ring = {node}
@@ -74,7 +74,7 @@ class Nodes:
         return min(ring)
 
     def world(self, pose: Pose) -> Array:
-        """float64 (N, 4, 4): from each node's space to that of the scene."""
+        """Compute the matrices from the space of each node to that of the scene: float64 (N, 4, 4)."""
         local = np.zeros((len(self.parents), 4, 4))
         with np.errstate(all="ignore"):  # what is not finite is the caller's to find
             local[:, :3, :3] = turns(pose.rotation) * pose.scale[:, None, :]
@@ -88,7 +88,7 @@ class Nodes:
 
 
 def turns(quaternions: Array) -> Array:
-    """Rotation matrices (N, 3, 3) of quaternions (N, 4)."""
+    """Convert quaternions (N, 4) to rotation matrices (N, 3, 3)."""
     x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -100,19 +100,19 @@ def turns(quaternions: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Which joints carry V vertices, and how much of each."""
+    """The joints that move V vertices, and their weights."""
 
     nodes: Array
-    """int (J,): the node that each joint is"""
+    """int (J,): the node of each joint"""
     inverse_bind: Array
-    """float64 (J, 4, 4): from the mesh's space to that of the joint, where the mesh was bound"""
+    """float64 (J, 4, 4): from the space of the mesh to that of the joint, in the bind pose"""
     joints: Array
     """int (V, K), indices into nodes"""
     weights: Array
     """float64 (V, K), rows summing to 1"""
 
     def carry(self, positions: Array, world: Array) -> Array:
-        """Positions (V, 3) of the mesh in the scene's space, the world matrices of all nodes being (N, 4, 4)."""
+        """Skin positions (V, 3) of the mesh into scene space, with the world matrices (N, 4, 4) of all nodes."""
         matrices = (world[self.nodes] @ self.inverse_bind)[:, :3].reshape(-1, 12)
         blended = np.zeros((len(positions), 12))
         for joint, weight in zip(self.joints.T, self.weights.T, strict=True):
@@ -124,23 +124,23 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """V vertices of one primitive as a node places it."""
+    """The V vertices of a primitive at a node."""
 
     node: int
     positions: Array
-    """float64 (V, 3), the mesh's own space"""
+    """float64 (V, 3), in the space of the mesh"""
     targets: Array
-    """float32 (T, V, 3): what each morph target adds to the positions"""
+    """float32 (T, V, 3): the offsets of each morph target"""
     skin: Skin | None
     instance: Array | None = None
-    """float64 (4, 4): where in the node's space it stands; None where it stands as the node does"""
+    """float64 (4, 4): transform of an instance in the space of the node, or None"""
 
     def is_shaped(self, pose: Pose) -> bool:
-        """Whether a pose does more than to place it with its node."""
+        """Whether a pose deforms the part, by a skin or by morph targets."""
         return self.skin is not None or bool(pose.weights[self.node].any())
 
     def posed(self, pose: Pose, world: Array) -> Array:
-        """float64 (V, 3), in the scene's space."""
+        """Compute the positions in scene space: float64 (V, 3)."""
         morphed = self.positions
         for weight, target in zip(pose.weights[self.node], self.targets, strict=True):
             if weight:
@@ -153,26 +153,26 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """All that moves in a file."""
+    """The nodes of a file and the parts that they move."""
 
     nodes: Nodes
     parts: tuple[Part, ...]
 
     def of(self, numbers: Sequence[int]) -> Rig:
-        """The rig of some of the parts, by number."""
+        """Return the rig of some of the parts, by number."""
         return Rig(self.nodes, tuple(self.parts[number] for number in numbers))
 
     def positions(self, pose: Pose) -> Array:
-        """float64 (V, 3): the vertices of all parts, one after the other, in the file's units."""
+        """Compute the positions of the vertices of all parts in a row: float64 (V, 3), in the unit of the file."""
         world = self.nodes.world(pose)
         return np.concatenate([part.posed(pose, world) for part in self.parts])
 
     def movers(self) -> set[int]:
-        """The nodes on whose place any vertex depends."""
-        found: set[int] = set()
+        """Return the nodes whose transform affects any vertex."""
+        nodes: set[int] = set()
         for part in self.parts:
             for node in [part.node] if part.skin is None else part.skin.nodes.tolist():
-                while node >= 0 and node not in found:
-                    found.add(node)
+                while node >= 0 and node not in nodes:
+                    nodes.add(node)
                     node = int(self.nodes.parents[node])
-        return found
+        return nodes

@@ -1,4 +1,4 @@
-"""A scene: objects, lights, a camera, and how its light becomes a picture."""
+"""A scene: objects, lights, a camera, and the settings of tone mapping."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ Array = npt.NDArray[Any]
 
 TONE_MAPS = ("none", "reinhard", "aces")
 FAR = 16.0
-"""Distance of the point that the camera looks at from the origin, in distances from the camera, beyond which a scene is
-moved to the origin to be rendered."""
+"""A scene is moved to the origin for rendering if the target of its camera is farther from the origin than this number
+times the distance between eye and target."""
 
 
 class Motion(Protocol):
-    """How an object's shape changes over time, over and over."""
+    """A periodic deformation of an object."""
 
     @property
     def period_s(self) -> float:
-        """Seconds after which it begins anew."""
+        """The period, seconds."""
 
     def apply(self, positions: Array, time_s: float) -> Array:
-        """Positions (V, 3) in mm, in the object's own space, as they are at a time in seconds."""
+        """Deform positions (V, 3) at rest to those at a time in seconds. Both are in object space, mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Object:
     rotate: Triple = (0.0, 0.0, 0.0)
     """degrees about the world's x, then y, then z axis, through the object's origin"""
     motion: Motion | None = None
-    """in the object's own space, before it is placed"""
+    """a deformation in object space, applied before the object is placed"""
 
     def __post_init__(self) -> None:
         checks.position(self, "translate")
@@ -56,7 +56,7 @@ class Object:
 
     @cached_property
     def matrix(self) -> npt.NDArray[np.float64]:
-        """(4, 4): object space to world space, rigid."""
+        """The rigid matrix (4, 4) from object space to world space."""
         matrix = np.eye(4)
         for axis, degrees in enumerate(self.rotate):
             cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
@@ -69,12 +69,12 @@ class Object:
 
     @cached_property
     def placed(self) -> npt.NDArray[np.float64]:
-        """float64 (V, 3): the mesh's positions in world space, mm."""
+        """float64 (V, 3): the positions of the mesh in world space, mm."""
         world: npt.NDArray[np.float64] = self.mesh.positions @ self.matrix[:3, :3].T + self.matrix[:3, 3]
         return world
 
     def at(self, time_s: float) -> Object:
-        """The object as it is at a time in seconds, no longer moving. Raises InputError where that is no shape."""
+        """Return the object at a time in seconds, without motion. Raises InputError if its shape is invalid then."""
         if self.motion is None:
             return self
         try:
@@ -86,7 +86,7 @@ class Object:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is rendered. Raises InputError naming the field that does not fit."""
+    """Objects, lights and a camera. Raises InputError naming the field that is out of range."""
 
     name: str
     objects: tuple[Object, ...]
@@ -97,7 +97,7 @@ class Scene:
     tone_map: str = "aces"
     """one of none, reinhard, aces"""
     bloom: float = 0.0
-    """the share of the light that spreads over the pixels around, on a display: radiance stays as it is"""
+    """share of the light that spreads over nearby pixels in the display image; the radiance is unchanged"""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "objects", tuple(self.objects))
@@ -112,13 +112,15 @@ class Scene:
 
     @cached_property
     def bounds(self) -> npt.NDArray[np.float64]:
-        """(2, 3): the least and greatest coordinates of all objects, world mm."""
+        """(2, 3): the least and greatest coordinates of all objects in world space, mm."""
         points = np.concatenate([o.placed for o in self.objects])
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     def near_origin(self) -> Scene:
-        """The same scene moved so that what the camera looks at is at the origin, where that is far away:
-        coordinates in single precision would be too coarse there."""
+        """Move the scene so that the target of the camera is at the origin, if it is far away from it.
+
+        Far from the origin, coordinates in single precision would be too coarse.
+        """
         camera = self.camera
         if math.dist((0, 0, 0), camera.target) <= FAR * math.dist(camera.eye, camera.target):
             return self
@@ -140,9 +142,9 @@ class Scene:
         )
 
     def at(self, time_s: float) -> Scene:
-        """The scene as it is at a time in seconds: a still, in which nothing moves or turns.
+        """Return the scene at a time in seconds, as one in which nothing moves.
 
-        Raises InputError for times beyond 1e9 s either way.
+        Raises InputError for times above 1e9 s or below -1e9 s.
         """
         checks.time(time_s)
         return replace(self, objects=tuple(o.at(time_s) for o in self.objects), camera=self.camera.at(time_s))

@@ -1,13 +1,17 @@
 """Scene files: the dataclasses of this package as TOML.
 
-The top level holds `name`, `exposure`, `tone_map` and `bloom`. `[camera]`, each `[[light]]` and each `[[object]]` hold
-the fields of theirs, cameras and lights under a `kind`; a camera has an `eye`, or the `distance`, `azimuth` and
-`elevation` of an orbit. An object has a `mesh`, a file, or a `shape` with the arguments of that function in `shapes`.
-Beside a `mesh` may stand `mm_per_unit` or `size_mm`, the `animation` of a glTF, and `simplify`, the greatest number of
-faces; each material of the file becomes an object. A `material` is a name, a material file, or a table
-`[object.material]`. Such a table or file holds the fields of Material, may start from a `preset`, and names images as
-`base_color_map`, `normal_map` and `specular_map`. The `kind` of an `[object.motion]` is a class of `motion` in snake
-case. Paths are relative to the file they stand in. What is left out has the defaults of a mesh file.
+The top level has the keys `name`, `exposure`, `tone_map` and `bloom`.
+
+- `[camera]` and `[[light]]` have a `kind` and the fields of its dataclass. In place of `eye`, a camera may have the
+  `distance`, `azimuth` and `elevation` of an orbit.
+- `[[object]]` has the fields of Object. It has either a `mesh`, which is a file, or a `shape`, which is a function of
+  `shapes`, with its arguments. A `mesh` may be followed by `mm_per_unit` or `size_mm`, by the `animation` of a glTF
+  file, and by `simplify`, the largest number of faces. Each material of the file becomes an object.
+- `material` is a name, a material file, or a table `[object.material]`. The table or file has the fields of Material.
+  It may start from a `preset`, and names images as `base_color_map`, `normal_map` and `specular_map`.
+- `[object.motion]` has a `kind`, which is a class of `motion` in snake case, and its fields.
+
+Paths are relative to the file that contains them. Missing lights and a missing camera have the defaults of a mesh file.
 """
 
 from __future__ import annotations
@@ -42,7 +46,7 @@ LIGHTS = {
 
 
 def read_scene(path: Path) -> Scene:
-    """The scene of a file. Raises InputError naming the file, the table and the key that is wrong."""
+    """Read a scene file. Raises InputError naming the file, the table and the key that is wrong."""
     table, folder, where = tables.read_toml(path), path.parent, str(path)
     parts = {"objects": "object", "lights": "light", "camera": "camera"}
     simple = [key for key in inspect.signature(Scene).parameters if key not in parts]
@@ -61,7 +65,7 @@ def read_scene(path: Path) -> Scene:
 
 
 def _objects(table: Table, where: str, folder: Path) -> tuple[Object, ...]:
-    """What an [[object]] is: one thing of a shape, or all bodies of a mesh file."""
+    """Create the objects of an [[object]]: one for a shape, or one for each body of a mesh file."""
     if ("mesh" in table) == ("shape" in table):
         raise InputError(f"{where}: give either mesh, a file, or shape, a name")
     source = load_file if "mesh" in table else tables.choose(_shapes(), table["shape"], "shape", where)
@@ -74,7 +78,7 @@ def _objects(table: Table, where: str, folder: Path) -> tuple[Object, ...]:
         arguments["path"] = tables.file_in(table, "mesh", where, folder)
         if "motion" in table and arguments.setdefault("animation", NONE) != NONE:
             raise InputError(f"{where}: give either motion or the animation of the mesh")
-    made = tables.call(source, arguments, where)
+    loaded = tables.call(source, arguments, where)
 
     values = {key: table[key] for key in own if key in table and key != "material"}
     if "motion" in table:
@@ -87,14 +91,14 @@ def _objects(table: Table, where: str, folder: Path) -> tuple[Object, ...]:
         raise tables.at(where, error) from None
     if "mesh" in table:
         name = arguments["path"].name
-        for what, ones in (("light", made.lights), ("camera", made.cameras)):
+        for what, ones in (("light", loaded.lights), ("camera", loaded.cameras)):
             note_unused(name, len(ones), what, ": a scene file has its own")
-        found: tuple[Object, ...] = tables.call(
-            objects_of, {"file": made, "chosen": chosen, "where": name, **values}, where
+        objects: tuple[Object, ...] = tables.call(
+            objects_of, {"file": loaded, "chosen": chosen, "where": name, **values}, where
         )
-        return found
+        return objects
     material = DEFAULT_MATERIAL if chosen is None else chosen.material
-    return (tables.call(Object, {"mesh": made, "material": material, **values}, where),)
+    return (tables.call(Object, {"mesh": loaded, "material": material, **values}, where),)
 
 
 def _shapes() -> dict[str, Any]:
@@ -111,7 +115,7 @@ def _motions() -> dict[str, Any]:
 
 
 def light_of(table: Table, where: str, folder: Path) -> Light:
-    """The light of a [[light]]; its file is relative to `folder`. Raises InputError naming `where` and the key."""
+    """Create the light of a [[light]], its file relative to `folder`. Raises InputError naming `where` and the key."""
     if "file" in table:
         table = {**table, "file": str(tables.file_in(table, "file", where, folder))}
     light: Light = tables.call_kind(table, LIGHTS, where)
@@ -119,13 +123,13 @@ def light_of(table: Table, where: str, folder: Path) -> Light:
 
 
 def camera_of(table: Any, where: str) -> Camera:
-    """The camera of a [camera]. Raises InputError naming `where` and the key."""
-    found: Camera
+    """Create the camera_class of a [camera_class]. Raises InputError naming `where` and the key."""
+    camera: Camera
     if not isinstance(table, dict) or "distance" not in table:
-        found = tables.call_kind(table, CAMERAS, where)
-        return found
-    camera = tables.choose(CAMERAS, table.get("kind"), "kind", where)
-    orbit = {key: p for key, p in inspect.signature(camera.orbit).parameters.items() if key != "rest"}
-    own = {key: p for key, p in inspect.signature(camera).parameters.items() if key != "eye"}
-    found = tables.call(camera.orbit, {k: v for k, v in table.items() if k != "kind"}, where, {**own, **orbit})
-    return found
+        camera = tables.call_kind(table, CAMERAS, where)
+        return camera
+    camera_class = tables.choose(CAMERAS, table.get("kind"), "kind", where)
+    orbit = {key: p for key, p in inspect.signature(camera_class.orbit).parameters.items() if key != "rest"}
+    own = {key: p for key, p in inspect.signature(camera_class).parameters.items() if key != "eye"}
+    camera = tables.call(camera_class.orbit, {k: v for k, v in table.items() if k != "kind"}, where, {**own, **orbit})
+    return camera

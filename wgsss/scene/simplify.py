@@ -1,4 +1,4 @@
-"""Meshes with fewer faces."""
+"""Simplification of meshes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ Array = npt.NDArray[Any]
 
 
 def simplified(positions: Array, faces: Array, most: int) -> tuple[Array, Array]:
-    """float32 (V, 3) and int64 (F, 3): a surface near the one given, of about `most` faces.
+    """Simplify a mesh to about `most` faces. Returns positions float32 (V, 3) and faces int64 (F, 3).
 
-    Edges are collapsed by quadric errors (Garland & Heckbert 1997), as the library fast-simplification has them.
+    Edges are collapsed in the order of their quadric error (Garland & Heckbert 1997), by the library
+    fast-simplification.
     """
     from fast_simplification import simplify
 
     welded, index = weld(positions)
-    found, kept = simplify(welded, index[faces].astype(np.int32), target_count=most)
-    return np.asarray(found, np.float32), np.asarray(kept, np.int64)
+    vertices, triangles = simplify(welded, index[faces].astype(np.int32), target_count=most)
+    return np.asarray(vertices, np.float32), np.asarray(triangles, np.int64)

@@ -1,4 +1,4 @@
-"""The triangles of a body as a file has them, before they become one clean mesh."""
+"""The triangles of a body as the file has them, before repair."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Soup:
-    """V vertices and F faces of parts that were joined."""
+    """V vertices and F faces of several parts, joined."""
 
     positions: Array
-    """float64 (V, 3) at rest, in the file's space and unit"""
+    """float64 (V, 3) at rest, in the space and unit of the file"""
     faces: Array
     """int64 (F, 3)"""
     normals: Array | None
@@ -34,10 +34,10 @@ class Soup:
     colors: Array | None
     """float64 (V, 3), linear, 0 to 1"""
     sources: Blend | None = None
-    """what each vertex is of those of the parts, one after the other; None where it is the one of its number"""
+    """the vertices as blends of those of all parts in a row; None if they are the same"""
 
     def cut(self, mask: Mask) -> Soup:
-        """What the mask leaves; its texture coordinates are the soup's."""
+        """Cut the soup along the outline of a mask over its texture coordinates."""
         if self.uvs is None:
             return self if mask.alpha.flat[0] >= mask.cutoff else replace(self, faces=self.faces[:0])
         blend, faces = cut(self.positions, self.faces, self.uvs, mask)
@@ -48,20 +48,20 @@ class Soup:
 
 
 def placed(parts: Sequence[Part], rig: Rig | None) -> list[Array]:
-    """float64 (V, 3) of each part at rest, in the file's space and unit."""
-    found = [_transform(part.positions, part.matrix[:3, :3]) + part.matrix[:3, 3] for part in parts]
+    """Compute the positions of each part at rest: float64 (V, 3) each, in the space and unit of the file."""
+    positions = [_transform(part.positions, part.matrix[:3, :3]) + part.matrix[:3, 3] for part in parts]
     if rig is not None:
         rest, world = rig.nodes.rest, rig.nodes.world(rig.nodes.rest)
         for number, part in enumerate(rig.parts):
             if part.is_shaped(rest):
-                found[number] = part.posed(rest, world)
-    return found
+                positions[number] = part.posed(rest, world)
+    return positions
 
 
 def joined(
     parts: Sequence[Part], positions: Sequence[Array], look: Look, rig: Rig | None, say: Callable[[str], None]
 ) -> Soup:
-    """Parts of one look, joined. `positions` are theirs, placed; `rig` is of these parts alone."""
+    """Join parts with the same material. `positions` are their placed positions. `rig` has these parts only."""
     faces, normals, start = [], [], 0
     for number, part in enumerate(parts):
         shaped = rig is not None and rig.parts[number].is_shaped(rig.nodes.rest)
@@ -85,14 +85,14 @@ def joined(
 
 
 def _uvs(parts: Sequence[Part], look: Look, say: Callable[[str], None]) -> Array | None:
-    found = [coordinates(part, look) for part in parts]
-    without = sum(uvs is None for uvs in found)
+    by_part = [coordinates(part, look) for part in parts]
+    without = sum(uvs is None for uvs in by_part)
     if without == len(parts):
         return None
     if without:
         say(f"texture coordinates left out: {without} of {len(parts)} parts have none")
         return None
-    uvs = np.concatenate([uvs for uvs in found if uvs is not None])
+    uvs = np.concatenate([uvs for uvs in by_part if uvs is not None])
     bad = ~(np.abs(uvs) <= FARTHEST_UV).all(axis=1)
     if bad.any():
         say(f"{counted(int(bad.sum()), 'texture coordinate')} not finite or beyond {FARTHEST_UV:g}, taken as 0")
@@ -103,13 +103,13 @@ def _uvs(parts: Sequence[Part], look: Look, say: Callable[[str], None]) -> Array
 def _colors(parts: Sequence[Part]) -> Array | None:
     if all(part.colors is None for part in parts):
         return None
-    found = [np.ones_like(part.positions) if part.colors is None else part.colors for part in parts]
-    colors = np.clip(np.nan_to_num(np.concatenate(found), nan=1.0), 0.0, 1.0)
+    by_part = [np.ones_like(part.positions) if part.colors is None else part.colors for part in parts]
+    colors = np.clip(np.nan_to_num(np.concatenate(by_part), nan=1.0), 0.0, 1.0)
     return None if (colors == 1.0).all() else colors
 
 
 def _transform(vectors: Array, linear: Array) -> Array:
-    """Each row times the matrix. In plain sums: BLAS may round equal rows differently, which would open seams."""
+    """Multiply each row by a matrix, without BLAS, which may round equal rows differently and so open seams."""
     x, y, z = vectors.T
     with np.errstate(all="ignore"):  # positions that are not finite are the caller's to find
         return np.stack([x * row[0] + y * row[1] + z * row[2] for row in linear], axis=1)

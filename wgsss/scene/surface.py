@@ -1,4 +1,4 @@
-"""The repaired triangles of a body as a mesh, with what its corners carry."""
+"""Builds the mesh of repaired triangles, with the attributes of its corners."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from wgsss.scene.soup import Soup
 
 Array = npt.NDArray[Any]
 
-# A file's normals are kept where more than this share of them lies further than this from the smooth ones: hard edges,
-# or normals set by hand. Below that they are smooth ones computed with other weights, and cracked at texture seams.
+# The normals of a file are kept if more than this share of them differs from smooth normals by more than this angle, as
+# at hard edges. Otherwise they are smooth normals computed with other weights, which would be cracked at texture seams.
 OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
 
 
 def surface(soup: Soup, fixed: Repaired, name: str) -> Mesh:
-    """The mesh of a soup's faces as they were repaired. Normals that turned over with their face point outwards."""
+    """Build the mesh of the repaired faces of a soup. Normals of flipped faces are flipped too, to point outwards."""
 
     def corners(values: Array | None) -> Array | None:
         return None if values is None else fixed.corners(values[soup.faces])
@@ -37,7 +37,7 @@ def surface(soup: Soup, fixed: Repaired, name: str) -> Mesh:
 
 
 def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
-    """A file's normals (F, 3, 3), made unit, with smooth ones where it has none; None where they are smooth anyway."""
+    """Normalise the normals (F, 3, 3) of a file, and fill missing ones. Returns None if all are nearly smooth."""
     length = np.linalg.norm(normals, axis=2, keepdims=True)
     smooth = mesh.normals[mesh.faces]
     unit = np.where(np.isfinite(length) & (length > 1e-6), normals / np.maximum(length, 1e-6), smooth)
@@ -46,7 +46,7 @@ def _own_normals(mesh: Mesh, normals: Array) -> Array | None:
 
 
 def device_vertices(mesh: Mesh) -> int:
-    """How many vertices the device is to hold: those of a mesh, once for each value of what its corners carry."""
+    """Count the vertices of the render mesh: vertices are repeated where corners differ in an attribute."""
     carried = [values for values in (mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors) if values is not None]
     if not carried:
         return len(mesh.positions)

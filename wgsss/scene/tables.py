@@ -1,4 +1,4 @@
-"""From TOML tables to calls of dataclasses and functions, whose signatures say which keys there are."""
+"""Calls dataclasses and functions with the values of TOML tables. Their signatures define the allowed keys."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KINDS: dict[str, tuple[Any, str]] = {  # what TOML may give for a parameter, by
 
 
 def read_toml(path: Path) -> Table:
-    """The top-level table of a file. Raises InputError, naming the file, where it is missing or not TOML."""
+    """Read the top-level table of a file. Raises InputError, naming the file, if it is missing or not TOML."""
     text = read_text(path, "a TOML file")
     try:
         return tomllib.loads(text)
@@ -39,7 +39,7 @@ def read_toml(path: Path) -> Table:
 
 
 def call(function: Callable[..., Any], table: Table, where: str, parameters: Parameters | None = None) -> Any:
-    """Call a function or class with a table's keys as its arguments, every error naming the table."""
+    """Call a function or class with the keys of a table as its arguments. Every error names the table."""
     parameters = parameters or inspect.signature(function).parameters
     check_keys(table, parameters, where)
     for key, parameter in parameters.items():
@@ -65,7 +65,7 @@ def _check_kind(parameter: inspect.Parameter, value: Any, where: str) -> None:
 
 
 def call_kind(table: Any, kinds: Mapping[str, Any], where: str) -> Any:
-    """Call what a table's `kind` names with its other keys."""
+    """Call the function or class that the `kind` of a table names with its other keys."""
     check_keys(table, None, where)
     if "kind" not in table:
         raise InputError(f"{where}: key 'kind' is missing (one of {', '.join(kinds)})")
@@ -73,7 +73,7 @@ def call_kind(table: Any, kinds: Mapping[str, Any], where: str) -> Any:
 
 
 def choose(choices: Mapping[str, Any], name: Any, what: str, where: str) -> Any:
-    """One of the choices by its name."""
+    """Return one of the choices by its name."""
     if not isinstance(name, str):
         raise InputError(f"{where}: {what} must be text, not {shown(name)}")
     if name not in choices:
@@ -82,7 +82,7 @@ def choose(choices: Mapping[str, Any], name: Any, what: str, where: str) -> Any:
 
 
 def check_keys(table: Any, known: Iterable[str] | None, where: str) -> None:
-    """Raise InputError unless this is a table without any key but those known; None stands for any."""
+    """Raise InputError unless the value is a table with known keys only. None allows any key."""
     if not isinstance(table, dict):
         raise InputError(f"{where} must be a table, not {shown(table)}")
     for key in table:
@@ -91,7 +91,7 @@ def check_keys(table: Any, known: Iterable[str] | None, where: str) -> None:
 
 
 def file_in(table: Table, key: str, where: str, folder: Path) -> Path:
-    """The file that a key names, relative to a folder. Raises InputError unless it is there."""
+    """Return the path of the file that a key names, relative to a folder. Raises InputError if it does not exist."""
     if not isinstance(table[key], str):
         raise InputError(f"{where}: {key} must be the path of a file, not {shown(table[key])}")
     try:
@@ -103,7 +103,7 @@ def file_in(table: Table, key: str, where: str, folder: Path) -> Path:
 
 
 def each(table: Table, key: str, where: str) -> list[tuple[Table, str]]:
-    """The tables of an array of tables, and where each one is."""
+    """Return the tables of an array of tables, each with its place for errors."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(t, dict) for t in value):
         raise InputError(f"{where}: {key} must be a list of tables: [[{key}]]")
@@ -111,5 +111,5 @@ def each(table: Table, key: str, where: str) -> list[tuple[Table, str]]:
 
 
 def at(where: str, error: InputError) -> InputError:
-    """The error with the place it belongs to, if it does not name it yet."""
+    """Return the error with its place in front, unless it names the place already."""
     return error if str(error).startswith(where) else InputError(f"{where}: {error}")

@@ -1,4 +1,4 @@
-"""The textures of a mesh file: which of them a part can have, where they lie on it, and their pixels."""
+"""The textures of a mesh file: which of them a part can use, their texture coordinates, and their pixels."""
 
 from __future__ import annotations
 
@@ -20,23 +20,25 @@ Array = npt.NDArray[Any]
 Say = Callable[[str], None]
 
 FARTHEST_UV = 1e6
-"""Texture coordinates beyond this, or not finite, are taken as 0: no texel could be told from its neighbours there."""
+"""Texture coordinates beyond this, or not finite, become 0: single precision cannot resolve texels there."""
 
 _SQUARED = 256
-"""Texels on a side below which a mask that is not interpolated is refined, so that its corners are not cut off."""
+"""A mask without interpolation is refined to about this many texels per side, so that its corners stay sharp."""
 
 
 _ROUNDING = 1e-4  # of texture coordinates at the border of the image
 
 
 def first_texture(look: Look) -> Texture | None:
-    """The texture whose place on the surface all textures of the look share."""
+    """Return the first texture of the look. The others must lie over the same coordinates."""
     return next((texture for slot in SLOTS if (texture := _texture(look, slot)) is not None), None)
 
 
 def usable_look(part: Part, say: Say) -> Look:
-    """The part's look, without textures that it cannot have: all, where it has no texture coordinates, and those
-    that lie over other coordinates than the first."""
+    """Return the look of a part without the textures that it cannot use.
+
+    Those are all textures if it has no texture coordinates, and textures over other coordinates than the first one.
+    """
     look, first = part.look, first_texture(part.look)
     if first is None:
         return look
@@ -60,12 +62,12 @@ def usable_look(part: Part, say: Say) -> Look:
 
 
 def _within(uvs: Array | None) -> bool:
-    """Whether texture coordinates (V, 2) keep to the image, so that nothing of it repeats."""
+    """Whether texture coordinates (V, 2) stay within the image, so that it does not repeat."""
     return uvs is None or bool(((uvs >= -_ROUNDING) & (uvs <= 1 + _ROUNDING)).all())
 
 
 def shared(looks: list[Look], say: Say) -> Look:
-    """What all of some looks have in common; what differs is left out."""
+    """Return the common properties of several looks. Properties that differ are left out."""
     first = looks[0]
     for slot in SLOTS:
         if any(_texture(look, slot) != _texture(first, slot) for look in looks):
@@ -79,7 +81,7 @@ def shared(looks: list[Look], say: Say) -> Look:
 
 
 def coordinates(part: Part, look: Look) -> Array | None:
-    """float64 (V, 2): where the look's textures are on the part, v down; None without texture coordinates."""
+    """Compute the texture coordinates of a look on a part: float64 (V, 2), v down. None if the part has none."""
     first = first_texture(look)
     uvs = part.uvs.get(first.coordinates if first else 0)
     if uvs is None or first is None or first.transform is None:
@@ -90,34 +92,34 @@ def coordinates(part: Part, look: Look) -> Array | None:
 
 
 class TextureReader:
-    """Decodes the textures of a file, each once."""
+    """Decodes the textures of a file, each only once."""
 
     def __init__(self, say: Say) -> None:
         self._say = say
         self._images: dict[Any, Array | None] = {}
 
     def maps(self, look: Look) -> Maps:
-        """The look's textures. One that is damaged, or larger than a texture can be, is left out and said."""
+        """Decode the textures of a look. A texture that is damaged or too large is left out with a note."""
         base_color, normal, specular = (self._image(_texture(look, slot), slot) for slot in SLOTS)
-        found = Maps(base_color, normal, specular)
+        textures = Maps(base_color, normal, specular)
         first = first_texture(look)
         if first is not None:
-            found = replace(found, wrap=first.wrap, nearest=first.nearest)
+            textures = replace(textures, wrap=first.wrap, nearest=first.nearest)
         scale = min(max(look.normal_scale, -STEEPEST), STEEPEST)
         if scale != look.normal_scale:
             self._say(f"a normal scale of {look.normal_scale:g} taken as {scale:g}")
-        return replace(found, normal_scale=scale, tint=look.base_color)
+        return replace(textures, normal_scale=scale, tint=look.base_color)
 
     def mask(self, look: Look) -> Mask | None:
-        """Where the surface is, if the look's alpha says so."""
+        """Return the alpha mask of a look, or None if its alpha does not matter."""
         if look.cutoff is None:
             return None
         alpha = np.full((1, 1), 255, np.uint8)
         wrap = ("repeat", "repeat")
         if look.base_color_map is not None:
             wrap = look.base_color_map.wrap
-            found = self._image(replace(look.base_color_map, channels="A"), "alpha")
-            alpha = alpha if found is None else found
+            decoded = self._image(replace(look.base_color_map, channels="A"), "alpha")
+            alpha = alpha if decoded is None else decoded
             if look.base_color_map.nearest:  # its outline follows the sides of texels
                 finer = min(max(_SQUARED // max(alpha.shape), 1), 16)
                 alpha = alpha.repeat(finer, axis=0).repeat(finer, axis=1)
@@ -140,8 +142,8 @@ class TextureReader:
 
 
 def _texture(look: Look, slot: str) -> Texture | None:
-    found: Texture | None = getattr(look, f"{slot}_map")
-    return found
+    texture: Texture | None = getattr(look, f"{slot}_map")
+    return texture
 
 
 def _without(look: Look, slot: str) -> Look:
