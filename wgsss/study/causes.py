@@ -103,7 +103,7 @@ def photon_profiles(scene: Scene) -> dict[int, Profile]:
     """The profile of each object's material, by the object's index, as PHOTONS photons tell it.
 
     They enter from everywhere, as L_d does not tell from where: on balls, even under a beam, that is nearer to volume
-    than a right angle (examples/spheres.py).
+    than a right angle (studies/spheres.py).
 
     Raises InputError where a material is known by its profile only.
     """

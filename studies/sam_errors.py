@@ -1,6 +1,6 @@
-"""How far M_back of spatial adjacency maps is from the sum over all vertices behind: what the scripts beside this use.
+"""Measure the error of M_back by spatial adjacency maps against the sum over all vertices on the back side.
 
-No light of these is among those that `fit` is tried on.
+The scripts beside this one use it. None of its lights is among the training lights of `fit`.
 """
 
 from collections.abc import Sequence

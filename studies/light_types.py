@@ -1,10 +1,10 @@
-"""Which methods mind which light: errors of M under one light of each type, as tables that colour tells apart.
+"""Tabulate the error of M of each method under one light of each type, as tables coloured by error.
 
 for scene in ear leaf milk; do wgsss compare $scene --lights all; done
-python examples/light_types.py ear-compare leaf-compare milk-compare -o light_types.png
+python studies/light_types.py ear-compare leaf-compare milk-compare -o light_types.png
 
-Relative RMSE of M against the reference, per cent, read from the metrics.json of each folder; beside the four types
-what the scene's own lights give. What the reference itself cannot tell is in the last row.
+The tables hold the relative RMSE of M against the reference in per cent, read from the metrics.json of each folder.
+The first column is measured under the scene's own lights. The last row is the error of the reference itself.
 """
 
 import argparse

@@ -1,11 +1,11 @@
-"""Spatial adjacency maps of more and more senders come nearer to the sum over all (Maisch & Ropinski 2017, figure 10).
+"""Plot how spatial adjacency maps converge with the number of samples (Maisch & Ropinski 2017, figure 10).
 
-python examples/sam_convergence.py happy_buddha.obj --material marble --size-mm 150 -o convergence.png
+python studies/sam_convergence.py happy_buddha.obj --material marble --size-mm 150 -o convergence.png
 
-Relative RMSE of M_back, at random vertices, against the sum of form factors times L_d over all vertices on the back
-side: mean over four directional lights with shadows, and under an even sky. With --integral also that of this sum
-itself, against the integral over the surface between the vertices. `fit` ends at 20 samples, since its bake takes
-longer for more.
+The error is the relative RMSE of M_back at random vertices. Its reference is the sum of form factor times L_d over all
+vertices on the back side. The script reports the mean error under four directional lights with shadows, and the error
+under a uniform sky. --integral also reports the error of that sum against the integral over the surface between the
+vertices. `fit` ends at 20 samples because more samples take much longer to bake.
 """
 
 import argparse

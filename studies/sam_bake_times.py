@@ -1,10 +1,11 @@
-"""How long spatial adjacency maps take to bake, beside what their paper reports. Nothing comes from the cache.
+"""Measure how long spatial adjacency maps take to bake, next to the times that their paper reports.
 
-python examples/sam_bake_times.py --vertices 5000 20000 --mesh dragon.obj marble 100 -o times.png
+python studies/sam_bake_times.py --vertices 5000 20000 --mesh dragon.obj marble 100 -o times.png
 
-Wall seconds, and CPU seconds of all threads, which other work on the machine lengthens less. What shaders take to
-compile is not counted. The chart has CPU seconds over vertices, and those of a vertex over how far light reaches: the
-distance beyond which one per cent of it leaves, of the mesh's longest side.
+Nothing is read from the cache. The table has wall time and the CPU time of all threads; other work on the machine
+disturbs CPU time less. The time to compile shaders is not counted. The chart shows CPU time over the number of
+vertices, and CPU time per vertex over the reach of light. The reach is the distance beyond which one per cent of the
+light leaves, divided by the mesh's longest side.
 """
 
 import argparse

@@ -1,7 +1,8 @@
-"""How far the profile of a half space is from what light does in a ball: needs Mitsuba 3 and some minutes.
+"""Measure how far the profile of a half space is from light transport in a ball; needs Mitsuba 3 and some minutes.
 
-Index-matched balls with a radius of 10 and 50 mean free paths (of green), under an even sky and under a beam from the
-side: RMS errors of M against `volume`, relative and without its noise, by profiles of photons and of the dipole.
+The balls are index-matched and have a radius of 10 or 50 mean free paths of the green channel. They are lit by a
+uniform sky or by a beam from the side. The table gives the relative RMS error of M against `volume`, without the noise
+of `volume`, with the profile by photons and with the dipole.
 """
 
 from __future__ import annotations

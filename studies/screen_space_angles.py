@@ -1,10 +1,11 @@
-"""How far products of two passes are from a profile's response to an edge, by the angle between edge and passes.
+"""Measure the error that separable kernels make at a straight edge, by the angle between the edge and the passes.
 
-python examples/screen_space_angles.py -o screen_space_angles.png
+python studies/screen_space_angles.py -o screen_space_angles.png
 
-Largest error of red, of full scale, on the six-Gaussian skin of d'Eon & Luebke 2007 and without its narrowest Gaussian:
-of the kernels themselves, by quadrature, and of pictures of a painted edge on a plane. Then what the passes cost over
-the number of taps, in turns in one run.
+The error is the largest difference from the profile's own response to an edge, in the red channel, relative to full
+scale. The skin is the sum of six Gaussians of d'Eon & Luebke 2007, with and without its narrowest Gaussian. Errors of
+the kernels themselves come from quadrature; errors as drawn come from pictures of a painted edge on a plane. The last
+table gives the time of the passes by the number of taps.
 """
 
 import argparse

@@ -1,10 +1,10 @@
-"""How much memory the viewer holds while it is used: the window is orbited and switched through all methods.
+"""Measure how much memory the viewer holds while it is used.
 
-python examples/viewer_memory.py ear --minutes 10      # needs a display, such as that of xvfb-run
+python studies/viewer_memory.py ear --minutes 10      # needs a display, such as that of xvfb-run
 
-A round shows every method and pair once, on the left, against the one before it on the right; each is orbited, then
-left alone until it is drawn in full. What the first round bakes and compiles stays, so that growth is told from there;
-it draws at every resolution, since drivers compile for each that textures have.
+The script orbits the camera and switches through all methods. One round shows every method and pair once, on the left,
+next to the previous one on the right. Each is orbited and then left alone until it is drawn in full. The first round
+bakes, compiles and draws at every resolution, since drivers compile shaders for each; growth is measured from its end.
 """
 
 import argparse

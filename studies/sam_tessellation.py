@@ -1,8 +1,9 @@
-"""What a finer mesh does to spatial adjacency maps: the nearest senders cover less of it, means over nodes as much.
+"""Measure how the error of spatial adjacency maps changes when the same shape has more vertices.
 
-python examples/sam_tessellation.py --vertices 5000 20000 80000
+python studies/sam_tessellation.py --vertices 5000 20000 80000
 
-Relative RMSE of M_back at random vertices of the same shape, against the sum over all that is behind.
+The error is the relative RMSE of M_back at random vertices, against the sum over all vertices on the back side. The
+senders of `top` cover less of a finer mesh; the means of `fit` cover as much of it as before.
 """
 
 import argparse

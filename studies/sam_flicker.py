@@ -1,11 +1,11 @@
-"""How much spatial adjacency maps flicker where senders pass a shadow's edge, and what blending over time leaves of it.
+"""Measure how much M_back flickers when a shadow's edge crosses senders, and how much blending over time removes.
 
-python examples/sam_flicker.py statue
+python studies/sam_flicker.py statue
 
-A sun turns by 40 degrees in one second, at 60 frames per second. Flicker is the RMS of the second difference in time of
-M_back at vertices, over the RMS of M_back, from 0.2 s on, when blending has settled; beside it, how many times that of
-the sum over all vertices behind. Blending (Maisch & Ropinski 2017, eq. 17, 18) also makes what changes late: `off` is
-the relative RMSE against that sum, as it is at the time.
+A sun turns by 40 degrees in one second, at 60 frames per second. Flicker is the RMS of the second difference in time
+of M_back at vertices, divided by the RMS of M_back. It is measured from 0.2 s on, when blending has settled, and is
+also given as a multiple of the flicker of the sum over all vertices on the back side. Blending (Maisch & Ropinski
+2017, eq. 17, 18) delays changes: `off` is the relative RMSE against that sum at the same time.
 """
 
 import argparse
