@@ -1,7 +1,7 @@
-# Every target sets up what it needs; `make help` lists them.
+# Every target first sets up everything that it needs; `make help` lists the targets.
 
 XDG_RUNTIME_DIR ?= /tmp
-export XDG_RUNTIME_DIR # unset, it makes Vulkan drivers print noise
+export XDG_RUNTIME_DIR # without it, Vulkan drivers print warnings
 
 BIN := .venv/bin
 DEMO := ear milk gyroid statue leaf
@@ -12,7 +12,7 @@ BENCH := sphere ear milk
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile
 
-setup: ## virtual environment, dependencies and, where there is none, a software Vulkan driver
+setup: ## create .venv, install dependencies and, if the machine has no Vulkan device, a software driver
 	@.ci/setup
 
 demo: setup ## render pictures into out/
@@ -23,15 +23,15 @@ demo: setup ## render pictures into out/
 	done
 	$(BIN)/wgsss profile skin1 --model dipole --model better-dipole --model burley --model gaussians --model photons \
 		-o out/skin1_profiles.png
-	@echo "Pictures: $(CURDIR)/out (methods.png shows what diffusion does)"
+	@echo "Pictures: $(CURDIR)/out (methods.png compares three methods)"
 
 test: setup ## run the tests
-	@$(BIN)/pytest -q --durations=10 -n 2 --dist loadfile # much of a test runs on one core
+	@$(BIN)/pytest -q --durations=10 -n 2 --dist loadfile # most of a test runs on one core
 
-test-lowest: setup ## run the tests with the oldest versions of other packages that are allowed
+test-lowest: setup ## run the tests with the oldest allowed versions of all dependencies
 	@.ci/lowest
 
-bench: setup ## measure what things cost, and chart speed against accuracy into out/bench/
+bench: setup ## run the benchmarks, and chart speed against accuracy into out/bench/
 	@$(BIN)/python tests/benchmarks.py
 	@mkdir -p out
 	$(BIN)/wgsss bench $(BENCH) -o out/bench
@@ -41,6 +41,6 @@ lint: setup ## check style and types
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-clean: ## remove what the targets made
+clean: ## remove all files that the targets created
 	rm -rf .venv .venv-lowest out dist build .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

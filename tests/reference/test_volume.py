@@ -46,7 +46,7 @@ from wgsss.scene.builtin import SCENES
 from wgsss.stage import Stage
 
 needs_mitsuba = pytest.mark.skipif(
-    importlib.util.find_spec("mitsuba") is None, reason="Mitsuba is not installed: pip install 'wgsss[reference]'"
+    importlib.util.find_spec("mitsuba") is None, reason="Mitsuba is not installed: pip install mitsuba"
 )
 
 MATCHED = Material("matched", sigma_a=(0.0, 0.0, 0.0), sigma_s_prime=(0.5, 0.5, 0.5), eta=1.0)
@@ -240,7 +240,7 @@ def test_newest_llvm(monkeypatch, tmp_path):
 
 def test_without_mitsuba(monkeypatch, gpu):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"volume needs Mitsuba 3: pip install 'wgsss\[reference\]'"):
+    with pytest.raises(InputError, match=r"volume needs Mitsuba 3: pip install mitsuba"):
         Volume().estimate(Stage(gpu, ball(SKY)), (8, 8))
 
 
@@ -249,7 +249,7 @@ def test_without_mitsuba(monkeypatch, gpu):
 
 @pytest.fixture
 def mi():
-    mitsuba = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install 'wgsss[reference]'")
+    mitsuba = pytest.importorskip("mitsuba", reason="Mitsuba is not installed: pip install mitsuba")
     mitsuba.set_variant("scalar_rgb")
     return mitsuba
 

@@ -20,14 +20,17 @@ if TYPE_CHECKING:
 
 DEFAULT_METHOD = "deon07"
 _SCENE = "a built-in scene (see 'wgsss scenes'), a scene file (.toml) or a mesh (.ply .obj .stl .off .glb .gltf)"
-
-
-_MATERIAL = """of all objects: a measured material, a material file (.toml) or a table as in such a file,
-'{preset = "marble", roughness = 0.5}'"""
-_CAMERA = """instead of the scene's: a table as in a scene file, '{kind = "perspective", eye = [0, 0, 300],
-target = [0, 0, 0]}'"""
-_LIGHT = """instead of the scene's: a table as in a scene file, '{kind = "point", position = [0, 0, 300],
-intensity = [1, 1, 1]}'; may be given again"""
+_MATERIAL = """material of all objects: a measured one (see 'wgsss materials'), a material file (.toml), or a table with
+the keys of such a file, as in '{preset = "marble", roughness = 0.5}'"""
+_CAMERA = """camera in place of the scene's own: a table with the keys of a scene file, as in '{kind = "perspective",
+eye = [0, 0, 300], target = [0, 0, 0]}'"""
+_LIGHT = """light in place of the scene's own: a table with the keys of a scene file, as in '{kind = "point",
+position = [0, 0, 300], intensity = [1, 1, 1]}'; repeat the option for more lights"""
+_SURFACE = "in place of a method: the surface method, which estimates the light from the near side (default: none)"
+_TRANSLUCENCY = (
+    "in place of a method: the translucency method, which estimates the light from the far side (default: none)"
+)
+_SET = "set a knob of the method; repeat the option for more knobs"
 
 
 class Parser(argparse.ArgumentParser):
@@ -67,14 +70,14 @@ def add_scene_choices(parser: Parser) -> None:
     """Add the options that replace parts of a scene."""
     add = parser.add_argument
     add("--material", metavar="NAME", type=name_or_table, help=_MATERIAL)
-    add("--size-mm", metavar="X", type=length, help="of a mesh file: length of its longest side, mm")
-    add("--animation", metavar="NAME", help="of a glTF: the animation to play, or none (default: its first)")
-    add("--simplify", metavar="N", type=count, help="of a mesh file: reduce each part of it to N faces, if it has more")
-    add("--vertices", metavar="N", type=count, help="of a built-in scene: about how many it has")
+    add("--size-mm", metavar="X", type=length, help="scale a mesh file so that its longest side is X mm long")
+    add("--animation", metavar="NAME", help="animation of a glTF file to play, or none (default: the first)")
+    add("--simplify", metavar="N", type=count, help="reduce each part of a mesh file to at most N faces")
+    add("--vertices", metavar="N", type=count, help="approximate number of vertices of a built-in scene")
     add("--camera", metavar="TABLE", type=table_of, help=_CAMERA)
     add("--light", metavar="TABLE", type=table_of, action="append", default=[], help=_LIGHT)
-    add("--file-camera", action="store_true", help="of a glTF: its own camera")
-    add("--file-lights", action="store_true", help="of a glTF: its own lights")
+    add("--file-camera", action="store_true", help="use the first camera of a glTF file")
+    add("--file-lights", action="store_true", help="use the lights of a glTF file")
 
 
 def has_scene_choices(args: argparse.Namespace) -> bool:
@@ -86,10 +89,10 @@ def has_scene_choices(args: argparse.Namespace) -> bool:
 def add_method(parser: Parser) -> None:
     """Add the options that choose a method and set its knobs."""
     add = parser.add_argument
-    add("--method", metavar="NAME", help=f"default: {DEFAULT_METHOD} (see 'wgsss methods')")
-    add("--surface", metavar="NAME", help="instead of a method: what estimates the light from the front, and")
-    add("--translucency", metavar="NAME", help="what estimates that from the back; of one alone, the other is none")
-    add("--set", metavar="KNOB=VALUE", dest="knobs", type=assignment, action="append", default=[], help="set a knob")
+    add("--method", metavar="NAME", help=f"method to render with (default: {DEFAULT_METHOD}; see 'wgsss methods')")
+    add("--surface", metavar="NAME", help=_SURFACE)
+    add("--translucency", metavar="NAME", help=_TRANSLUCENCY)
+    add("--set", metavar="KNOB=VALUE", dest="knobs", type=assignment, action="append", default=[], help=_SET)
 
 
 def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:

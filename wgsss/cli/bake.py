@@ -10,7 +10,7 @@ from wgsss.text import one_line
 
 
 def declare(commands: Any) -> None:
-    parser = arguments.command(commands, "bake", run, "precompute what rendering a scene needs")
+    parser = arguments.command(commands, "bake", run, "precompute the data that rendering a scene needs")
     arguments.add_scene(parser)
     arguments.add_method(parser)
 

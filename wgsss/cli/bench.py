@@ -10,8 +10,8 @@ from wgsss.cli import arguments
 from wgsss.errors import InputError
 from wgsss.text import one_line
 
-_SCENES = "built-in scenes, scene files or meshes; with none, what the folder holds is drawn again"
-_FOLDER = "where runs.jsonl, chart.svg, chart.png and chart.html go (default: bench)"
+_SCENES = "built-in scenes, scene files or meshes; without any, the chart is drawn again from the runs in the folder"
+_FOLDER = "folder for runs.jsonl, chart.svg, chart.png and chart.html (default: bench)"
 _HEAD = [
     "scene",
     "method",
@@ -25,10 +25,10 @@ _HEAD = [
     "FLIP",
     "bias",
 ]
-_TABLE = """speedup: instead of a chart, how much faster jimenez08 is than the same diffusion of all of the surface, by
-number of heads and distance; of the scene crowd, written to speedup.json"""
-_SIZE = "pixels (default: 256x256; of the table 480x300)"
-_SCHEDULER = "of a Dask cluster to run on (default: run here)"
+_TABLE = """speedup: in place of the chart, measure how much faster jimenez08 is than the same diffusion over the whole
+surface, by the number of heads and their distance; needs the scene crowd and writes speedup.json"""
+_SIZE = "size in pixels (default: 256x256; with --table 480x300)"
+_SCHEDULER = "address of a Dask cluster on which to run (default: run on this machine)"
 
 
 def declare(commands: Any) -> None:
@@ -37,7 +37,7 @@ def declare(commands: Any) -> None:
     add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
     arguments.add_scene_choices(parser)
     add("--methods", metavar="NAME,NAME,…", type=arguments.names, help="default: all (see 'wgsss methods')")
-    add("--reference", metavar="NAME", default="integral", help="what errors are measured against (default: integral)")
+    add("--reference", metavar="NAME", default="integral", help="reference for the errors (default: integral)")
     add("--table", metavar="NAME", choices=TABLES, help=_TABLE)
     add("--size", metavar="WxH", type=arguments.size, help=_SIZE)
     add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)

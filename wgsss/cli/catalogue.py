@@ -33,7 +33,8 @@ def methods(args: Any) -> None:
                 rows.append(["", f"--set {knob['name']}={_word(knob['default'])}  {knob['help']}, {_values(knob)}"])
     pairs = {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
     lines = [f"--{part} one of {', '.join(names)}" for part, names in pairs.items()]
-    text = "\n".join([arguments.table(rows), "", "or a pair of", *(f"  {line}" for line in lines)])
+    pair = ["or a surface method and a translucency method:", *(f"  {line}" for line in lines)]
+    text = "\n".join([arguments.table(rows), "", *pair])
     arguments.emit(args, {**result, "pairs": pairs}, text)
 
 

@@ -8,12 +8,12 @@ from typing import Any
 from wgsss.cli import arguments
 from wgsss.text import one_line
 
-_OUTPUT = """the folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); what
-else is in it stays"""
+_OUTPUT = """folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); other
+files in it are kept"""
 
-_METHODS = (
-    """such as lambert,sam,sam:select=top:samples=8, with knobs after a colon (default: all, see 'wgsss methods')"""
-)
+_LIGHTS = "all: compare also under one light of each type, each with the same mean irradiance"
+
+_METHODS = "methods to compare, with knobs after colons: lambert,sam,sam:select=top:samples=8 (default: all)"
 
 
 def declare(commands: Any) -> None:
@@ -22,8 +22,8 @@ def declare(commands: Any) -> None:
     add = parser.add_argument
     add("--methods", metavar="A,B,…", type=arguments.settings, help=_METHODS)
     add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
-    add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="pixels (default: 256x256)")
-    add("--lights", choices=["all"], help="'all': also under one light of each type, of the same mean irradiance")
+    add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="size in pixels (default: 256x256)")
+    add("--lights", choices=["all"], help=_LIGHTS)
     add("-o", "--output", metavar="DIR", type=arguments.output, help=_OUTPUT)
 
 

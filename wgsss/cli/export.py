@@ -13,10 +13,10 @@ def declare(commands: Any) -> None:
     parser = arguments.command(commands, "export", run, "write a scene for Mitsuba 3 or as glTF")
     arguments.add_scene(parser)
     add = parser.add_argument
-    add("--mitsuba", metavar="DIR", type=arguments.output, help="the folder to write scene.xml and its files to")
-    add("--gltf", metavar="FILE.glb", type=arguments.output, help="the glTF file to write")
-    add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
-    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="of a moving scene, seconds (default: 0)")
+    add("--mitsuba", metavar="DIR", type=arguments.output, help="folder for scene.xml and its files")
+    add("--gltf", metavar="FILE.glb", type=arguments.output, help="glTF file to write")
+    add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="size in pixels (default: 512x512)")
+    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="time in seconds (default: 0)")
 
 
 def run(args: Any) -> None:

@@ -17,9 +17,7 @@ _FILE = "a mesh, a scene or material file (.toml) or an environment image (.hdr 
 
 
 def declare(commands: Any) -> None:
-    summary = (
-        "list adapters, limits and versions, for a bug report; or what a file holds, its size and what is not used"
-    )
+    summary = "list adapters, limits and versions for a bug report; with FILE, list its contents and what is not used"
     parser = arguments.command(commands, "info", run, summary)
     parser.add_argument("file", metavar="FILE", nargs="?", type=Path, help=_FILE)
 

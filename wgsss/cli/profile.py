@@ -13,23 +13,23 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_MATERIAL = "a measured material (see 'wgsss materials') or a material file (.toml), which may have layers"
+_MATERIAL = "a measured material (see 'wgsss materials') or a material file (.toml); it may have layers"
 _PLOT = "plot R and r R, log and linear, to a .png or .svg"
 _MODEL = (
     "dipole, better-dipole, multipole, layers, burley, burley-diffuse, burley-dmfp, borshukov-lewis, gaussians, table \
-or photons; may be given several times (default: those that serve the material)"
+or photons; repeat the option for more models (default: all that apply to the material)"
 )
 
 
 def declare(commands: Any) -> None:
-    parser = arguments.command(commands, "profile", run, "compare models of how light spreads below a surface")
+    parser = arguments.command(commands, "profile", run, "compare models of a material's diffusion profile R")
     add = parser.add_argument
     add("material", metavar="MATERIAL", help=_MATERIAL)
     add("--model", metavar="M", dest="models", action="append", default=[], help=_MODEL)
-    add("--k", metavar="K", type=gaussians, default=6, help="Gaussians of a fit, 1 to 6 (default: 6)")
-    add("--thickness", metavar="MM", type=arguments.length, help="of a slab in air (default: without end)")
-    add("--r", metavar="MM,MM,…", type=radii, help="distances to print R at (default: 64 that show all of it)")
-    add("--photons", metavar="N", type=arguments.count, help="trace N photons per channel, as one of the models")
+    add("--k", metavar="K", type=gaussians, default=6, help="number of Gaussians in a fit, 1 to 6 (default: 6)")
+    add("--thickness", metavar="MM", type=arguments.length, help="thickness of a slab in air (default: infinite)")
+    add("--r", metavar="MM,MM,…", type=radii, help="distances at which to print R (default: 64 over its whole range)")
+    add("--photons", metavar="N", type=arguments.count, help="trace N photons per channel, and add them as a model")
     add(
         "-o",
         "--output",
@@ -37,7 +37,7 @@ def declare(commands: Any) -> None:
         type=arguments.output,
         help="plot R and r R, log and linear, to a .png or .svg",
     )
-    add("--csv", action="store_true", help="print R, one row per distance")
+    add("--csv", action="store_true", help="print R as CSV, one row per distance")
 
 
 def run(args: Any) -> None:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from wgsss.graph import Graph
     from wgsss.rendering import Image, Renderer
 
-_OUTPUT = """.png or .mp4, tone mapped; .exr or .npy, linear, with all extra outputs (default: SCENE.png). Several
-frames become one .mp4, or files with numbers"""
-_GRAPH = """print the passes that ran and those culled, with ms and bytes, of one more frame (the first one pays for
-compilation)"""
+_OUTPUT = """file to write (default: SCENE.png): .png or .mp4 for a tone-mapped picture, .exr or .npy for linear values
+and all extra outputs; several frames become one .mp4 or numbered files"""
+_GRAPH = """render one more frame and print its passes, run or culled, with their times and memory (shaders are compiled
+in the first frame)"""
 
 
 def declare(commands: Any) -> None:
@@ -26,16 +26,16 @@ def declare(commands: Any) -> None:
     arguments.add_scene(parser)
     arguments.add_method(parser)
     add = parser.add_argument
-    add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="pixels (default: 512x512)")
-    add("--frames", metavar="N", type=arguments.frames, default=1, help="render N frames (default: 1)")
+    add("--size", metavar="WxH", type=arguments.size, default=(512, 512), help="size in pixels (default: 512x512)")
+    add("--frames", metavar="N", type=arguments.frames, default=1, help="number of frames (default: 1)")
     add("--fps", metavar="F", type=arguments.rate, default=25.0, help="frames per second (default: 25)")
-    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="of the first frame, seconds (default: 0)")
-    add("--exposure", metavar="EV", type=arguments.number, help="stops, instead of the scene's own")
-    add("--tone-map", metavar="NAME", help="none, reinhard or aces, instead of the scene's own")
-    add("--bloom", metavar="SHARE", type=arguments.number, help="of the light that spreads, in pictures")
+    add("--time", metavar="S", type=arguments.seconds, default=0.0, help="start time in seconds (default: 0)")
+    add("--exposure", metavar="EV", type=arguments.number, help="stops, in place of the scene's own")
+    add("--tone-map", metavar="NAME", help="none, reinhard or aces, in place of the scene's own")
+    add("--bloom", metavar="SHARE", type=arguments.number, help="share of the light that bloom spreads, 0 to 1")
     add("-o", "--output", metavar="FILE", type=arguments.output, help=_OUTPUT)
     add("--graph", action="store_true", help=_GRAPH)
-    add("--graph-out", metavar="FILE.dot", type=arguments.output, help="write that frame's graph for Graphviz")
+    add("--graph-out", metavar="FILE.dot", type=arguments.output, help="write the graph of one more frame for Graphviz")
 
 
 def run(args: Any) -> None:

@@ -7,16 +7,17 @@ from typing import Any
 from wgsss.cli import arguments
 from wgsss.errors import InputError
 
-_AGAINST = "the method or reference on the right, such as sam:samples=8 (default: lambert)"
+_INSTALL = "pip install rendercanvas glfw imgui-bundle"
+_AGAINST = "method or reference on the right, as in sam:samples=8 (default: lambert)"
 
 
 def declare(commands: Any) -> None:
-    parser = arguments.command(commands, "view", run, "compare two methods in a window (needs the extra 'viewer')")
+    parser = arguments.command(commands, "view", run, "compare two methods in a window")
     arguments.add_scene(parser)
     arguments.add_method(parser)
     add = parser.add_argument
     add("--against", metavar="NAME", default="lambert", help=_AGAINST)
-    add("--size", metavar="WxH", type=arguments.size, help="of the window (default: as it was the last time)")
+    add("--size", metavar="WxH", type=arguments.size, help="size in pixels (default: the last size)")
 
 
 def _other(text: str) -> Any:
@@ -35,7 +36,7 @@ def run(args: Any) -> None:
         import imgui_bundle  # noqa: F401
         import rendercanvas  # noqa: F401
     except ImportError as error:
-        raise InputError(f"the viewer needs {error.name}: pip install 'wgsss[viewer]'") from None
+        raise InputError(f"the viewer needs {error.name}: {_INSTALL}") from None
     if not glfw.init():
         raise InputError("no window can be opened: there is no display")
 

@@ -46,7 +46,7 @@ class Paths:
 
     def __init__(self, scene: Scene, size: tuple[int, int], rays: Array) -> None:
         if importlib.util.find_spec("mitsuba") is None:
-            raise InputError("volume needs Mitsuba 3: pip install 'wgsss[reference]'")
+            raise InputError("volume needs Mitsuba 3: pip install mitsuba")
         from importlib.metadata import version
 
         self._scene, self._size, self._rays = scene, size, rays
