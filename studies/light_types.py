@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 OWN = "own"
-LEAST, MOST = 1.0, 100.0  # per cent, of the colours
+LEAST, MOST = 1.0, 100.0  # range of the colours, per cent
 
 
 class Table(NamedTuple):
-    """Of a comparison: `errors` (R, C) are rel_rmse, per cent."""
+    """The errors of one comparison: rel_rmse in per cent (R, C), for R methods and C lights."""
 
     title: str
     rows: list[str]
@@ -28,19 +28,19 @@ class Table(NamedTuple):
 
 
 def read(folder: Path) -> Table:
-    """The table of a report. Ends the program where it has one light only."""
-    found = json.loads((folder / "metrics.json").read_text())
-    if "lights" not in found:
+    """Read the table of a report. Exit if it was made without --lights all."""
+    metrics = json.loads((folder / "metrics.json").read_text())
+    if "lights" not in metrics:
         raise SystemExit(f"{folder}: compared without --lights all")
-    columns = {OWN: found["methods"], **found["lights"]}
+    columns = {OWN: metrics["methods"], **metrics["lights"]}
     errors = [[method["error"]["rel_rmse"] for method in methods] for methods in columns.values()]
     floors = [methods[0]["error"]["floor"] for methods in columns.values()]
-    rows = [*(method["name"] for method in found["methods"]), f"({found['reference']})"]
-    return Table(found["scene"], rows, list(columns), 100.0 * np.vstack([np.transpose(errors), floors]))
+    rows = [*(method["name"] for method in metrics["methods"]), f"({metrics['reference']})"]
+    return Table(metrics["scene"], rows, list(columns), 100.0 * np.vstack([np.transpose(errors), floors]))
 
 
 def draw(tables: list[Table], path: Path) -> None:
-    """The tables side by side, three in a row: the darker a cell, the greater the error."""
+    """Draw the tables, three in a row. A darker cell is a larger error."""
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
@@ -54,8 +54,8 @@ def draw(tables: list[Table], path: Path) -> None:
         axis.imshow(errors, norm=LogNorm(LEAST, MOST, clip=True), cmap="YlOrRd", aspect="auto")
         axis.set_title(title, loc="left", weight="bold")
         axis.set_xticks(range(len(columns)), columns, fontsize=8)
-        told = place % across > 0 and rows == tables[place - 1].rows
-        axis.set_yticks(range(len(rows)), [""] * len(rows) if told else rows, fontsize=9)
+        repeated = place % across > 0 and rows == tables[place - 1].rows
+        axis.set_yticks(range(len(rows)), [""] * len(rows) if repeated else rows, fontsize=9)
         axis.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
         axis.spines[:].set_visible(False)
         for (row, column), error in np.ndenumerate(errors):
@@ -69,7 +69,7 @@ def draw(tables: list[Table], path: Path) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folders", nargs="+", type=Path, help="of reports by `wgsss compare SCENE --lights all`")
+    parser.add_argument("folders", nargs="+", type=Path, help="reports by `wgsss compare SCENE --lights all`")
     parser.add_argument("-o", "--output", type=Path, default=Path("light_types.png"))
     args = parser.parse_args(argv)
     draw([read(folder) for folder in args.folders], args.output)

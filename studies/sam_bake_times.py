@@ -35,25 +35,25 @@ PAPER = {  # Maisch & Ropinski 2017, section 5.3: 3 samples by `top`, on an i7-4
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     add = parser.add_argument
-    add("--scene", default="statue", help="a built-in scene, to bake with each number of vertices")
+    add("--scene", default="statue", help="a built-in scene to bake with each number of vertices")
     add("--vertices", nargs="*", type=int, default=[5000, 20_000, 80_000])
     add("--mesh", nargs=3, action="append", default=[], metavar=("FILE", "MATERIAL", "SIZE_MM"))
     add("--select", nargs="+", choices=tuple(SELECTIONS), default=list(SELECTIONS))
-    add("--materials", nargs="*", default=["skin1", "ketchup", "wholemilk"], help="more of the scene, at 20k")
+    add("--materials", nargs="*", default=["skin1", "ketchup", "wholemilk"], help="further materials, at 20k vertices")
     add("--samples", type=int, default=3)
-    add("-o", "--output", type=Path, help="a chart")
+    add("-o", "--output", type=Path, help="chart to write")
     args = parser.parse_args(argv)
 
     print("mesh                          vertices  select  wall s   cpu s  bytes a vertex", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         os.environ["WGSSS_CACHE"] = folder
-        for select in args.select:  # compiles
+        for select in args.select:  # compile the shaders
             bake(load_scene("sphere", vertices=300, material="marble"), args.samples, select)
         scenes = [load_scene(args.scene, vertices=vertices) for vertices in args.vertices]
         scenes += [load_scene(file, material=name, size_mm=float(size)) for file, name, size in args.mesh]
         if args.output:
             scenes += [load_scene(args.scene, vertices=20_000, material=name) for name in args.materials]
-        found: dict[str, list[tuple[int, float, float]]] = {}
+        times: dict[str, list[tuple[int, float, float]]] = {}
         for scene in scenes:
             body = scene.objects[0]
             name = f"{scene.name}, {body.material.name}"
@@ -62,21 +62,21 @@ def main(argv: list[str] | None = None) -> None:
                 wall, cpu, size = bake(scene, args.samples, select)
                 vertices = len(body.mesh.positions)
                 reach = body.material.profile.range(0.01).max() / np.ptp(body.mesh.bounds, axis=0).max()
-                found.setdefault(select, []).append((vertices, float(reach), cpu))
+                times.setdefault(select, []).append((vertices, float(reach), cpu))
                 print(f"{name:28}  {vertices:8}  {select:6}  {wall:6.2f}  {cpu:6.2f}  {size:14}", flush=True)
     print("\nthe paper:", ", ".join(f"{name} {took}" for name, took in PAPER.items()))
     if args.output:
-        plot(found, args.output)
+        plot(times, args.output)
 
 
-def plot(found: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
-    """Seconds over vertices, and of a vertex over the reach of light."""
+def plot(times: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
+    """Plot CPU time over vertices, and CPU time per vertex over the reach of light."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     over_vertices, over_reach = figure.subplots(1, 2)
-    for select, rows in found.items():
+    for select, rows in times.items():
         vertices, reach, cpu = np.array(rows).T
         over_vertices.loglog(vertices, cpu, "o", color=COLOURS[select], label=select)
         over_reach.loglog(reach, 1e6 * cpu / vertices, "o", color=COLOURS[select])
@@ -90,14 +90,14 @@ def plot(found: dict[str, list[tuple[int, float, float]]], path: Path) -> None:
     over_reach.yaxis.set_minor_formatter("")
     for axis in (over_vertices, over_reach):
         axis.grid(alpha=0.25)
-    figure.legend(loc="outside lower center", ncols=len(found), frameon=False)
+    figure.legend(loc="outside lower center", ncols=len(times), frameon=False)
     figure.savefig(path, dpi=110)
 
 
 def bake(scene: Scene, samples: int, select: str) -> tuple[float, float, int]:
-    """Seconds, seconds of all cores, and bytes of a vertex's entries."""
+    """Bake a map; return the wall time and CPU time in seconds, and the bytes per vertex."""
     body = scene.objects[0]
-    _ = body.mesh.normals  # a part of loading
+    _ = body.mesh.normals  # computed when first used: counted as loading
     gpu, wall, cpu = default_gpu(), time.perf_counter(), time.process_time()
     entries = spatial_adjacency_map(gpu, body.mesh, body.material.profile, samples, select)
     return time.perf_counter() - wall, time.process_time() - cpu, entries.bytes // len(body.mesh.positions)

@@ -21,22 +21,22 @@ COLOURS = {"top": "#D55E00", "coarse": "#009E73", "fit": "#0072B2"}
 MOST = {"top": 256, "coarse": 256, "fit": 20}
 
 
-def plot(found: dict[str, list[tuple[int, float, float]]], title: str, path: Path) -> None:
-    """Errors over samples, both logarithmic; under a sky dashed."""
+def plot(errors_by_select: dict[str, list[tuple[int, float, float]]], title: str, path: Path) -> None:
+    """Plot errors over samples on logarithmic axes; errors under a sky are dashed."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     axis = figure.subplots()
-    for select, rows in found.items():
+    for select, rows in errors_by_select.items():
         n, suns, sky = zip(*rows, strict=True)
         axis.loglog(n, suns, "o-", color=COLOURS[select], label=f"{select}, suns")
         axis.loglog(n, sky, "o--", color=COLOURS[select], label=f"{select}, sky", ms=4, lw=1)
-    ticks = sorted({n for rows in found.values() for n, *_ in rows})
+    ticks = sorted({n for rows in errors_by_select.values() for n, *_ in rows})
     axis.set_xticks(ticks, [str(n) for n in ticks])
     axis.set_xticks([], minor=True)
     axis.set(xlabel="samples of a vertex", ylabel="relative RMSE of M_back", title=title)
     axis.grid(alpha=0.25)
-    figure.legend(loc="outside lower center", ncols=len(found), frameon=False)
+    figure.legend(loc="outside lower center", ncols=len(errors_by_select), frameon=False)
     figure.savefig(path, dpi=110)
 
 
@@ -45,9 +45,9 @@ def main(argv: list[str] | None = None) -> None:
     add = parser.add_argument
     add("scene", nargs="?", default="statue", help="a built-in scene, a scene file or a mesh")
     add("--material")
-    add("--size-mm", type=float, help="of a mesh: its longest side")
-    add("--vertices", type=int, help="of a built-in scene")
-    add("--receivers", type=int, default=2000, help="vertices at which M_back is compared")
+    add("--size-mm", type=float, help="scale a mesh so that its longest side has this length")
+    add("--vertices", type=int, help="approximate number of vertices of a built-in scene")
+    add("--receivers", type=int, default=2000, help="number of vertices at which M_back is compared")
     add("--samples", nargs="+", type=int, default=[1, 2, 3, 5, 8, 13, 20, 30, 50])
     add("--select", nargs="+", choices=tuple(SELECTIONS), default=list(SELECTIONS))
     add("--integral", action="store_true")
@@ -56,17 +56,17 @@ def main(argv: list[str] | None = None) -> None:
 
     scene = load_scene(args.scene, material=args.material, size_mm=args.size_mm, vertices=args.vertices)
     errors = Errors(scene, args.receivers)
-    found: dict[str, list[tuple[int, float, float]]] = {}
+    errors_by_select: dict[str, list[tuple[int, float, float]]] = {}
     print("select  samples   suns    sky", flush=True)
     for select in args.select:
         for samples in [n for n in args.samples if n <= MOST[select]]:
             print(f"{select}, {samples} samples", file=sys.stderr)
-            found.setdefault(select, []).append((samples, *errors.of(select, samples)))
-            print("{:6}  {:7}  {:.3f}  {:.3f}".format(select, *found[select][-1]), flush=True)
+            errors_by_select.setdefault(select, []).append((samples, *errors.of(select, samples)))
+            print("{:6}  {:7}  {:.3f}  {:.3f}".format(select, *errors_by_select[select][-1]), flush=True)
     if args.integral:
         print("{:15}  {:.3f}  {:.3f}".format("all, integral", *errors.of_the_sum()))
     vertices = len(scene.objects[0].mesh.positions)
-    plot(found, f"{scene.name}, {vertices} vertices", args.output)
+    plot(errors_by_select, f"{scene.name}, {vertices} vertices", args.output)
 
 
 if __name__ == "__main__":

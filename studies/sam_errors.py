@@ -23,14 +23,14 @@ from wgsss.stage import Body, Stage
 SUNS = [DirectionalLight(towards, (1, 1, 1)) for towards in ((2, -3, -6), (-6, -2, 3), (3, 6, 2), (0.3, 0.1, 1))]
 SKY = EnvironmentLight((1, 1, 1))
 PAIRS = 2_000_000
-"""whose form factors are integrated at a time"""
+"""largest number of pairs whose form factors are integrated at once"""
 
 
 class Errors:
-    """Of M_back under suns and under a sky, over the vertices of a scene's first object, told by some of them.
+    """The errors of M_back under suns and under a sky, estimated at random vertices of a scene's first object.
 
-    Through most of a thick thing hardly anything shines. So vertices are drawn by how bright M_back is, one in ten
-    regardless of it, and each counts for as many as it was unlikely to be drawn.
+    Hardly any light crosses most parts of a thick object. Vertices are therefore drawn with a probability that grows
+    with their M_back; one in ten is drawn uniformly. Each vertex is weighted by the inverse of its probability.
     """
 
     def __init__(self, scene: Scene, receivers: int) -> None:
@@ -41,7 +41,7 @@ class Errors:
         self.truth = sums(bodies[0], [irradiance_at(body, self.vertices) for body in bodies], self.chosen)
 
     def _drawn(self, receivers: int) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (k,) and how many each counts for (k,)."""
+        """Draw vertices (k,) and compute the weight of each (k,)."""
         power = np.square(M_back(self.stages[-1], SpatialAdjacencyMaps(surface="none"))).sum(axis=1, dtype=np.float64)
         p = 0.9 * power / max(power.sum(), 1e-30) + 0.1 / len(power)
         drawn = np.random.default_rng(1).choice(len(p), receivers, p=p / p.sum())
@@ -49,31 +49,34 @@ class Errors:
         return chosen, times / p[chosen]
 
     def of(self, select: str, samples: int) -> tuple[float, float]:
-        """Relative RMSE of a selection, the mean under suns and that under a sky."""
+        """Compute the relative RMSE of a selection: the mean under the suns, and the value under the sky."""
         method = SpatialAdjacencyMaps(samples=samples, select=select, surface="none")
         return self._relative([M_back(stage, method)[self.chosen] for stage in self.stages], self.truth)
 
     def of_the_sum(self) -> tuple[float, float]:
-        """That of the sum, which takes light as even over a fan, against the integral."""
+        """Compute the relative RMSE of the sum, which takes L_d as constant over a fan, against the integral."""
         places = replace(self.vertices, **{name: v[self.chosen] for name, v in vars(self.vertices).items()})
         bodies = [stage.bodies[0] for stage in self.stages]
-        found = [converged(b, places, b.material.profile, 0.05, 1_000_000).back for b in bodies]
-        return self._relative(self.truth, found)
+        integrals = [converged(b, places, b.material.profile, 0.05, 1_000_000).back for b in bodies]
+        return self._relative(self.truth, integrals)
 
-    def _relative(self, found: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, float]:
+    def _relative(self, estimates: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, float]:
         def power(values: np.ndarray) -> float:
             return float((self.share[:, None] * np.square(values)).sum())
 
-        *suns, sky = (np.sqrt(power(f - t) / power(t)) for f, t in zip(found, truth, strict=True))
+        *suns, sky = (np.sqrt(power(e - t) / power(t)) for e, t in zip(estimates, truth, strict=True))
         return float(np.mean(suns)), float(sky)
 
 
 def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.ndarray:
-    """(lights, receivers, 3), W/m^2: of all vertices behind each, by form factors (eq. 11) and sides (eq. 13, 14)."""
+    """Compute M_back, W/m^2 (lights, receivers, 3), as the sum over all vertices on the back side of each receiver.
+
+    Form factors are those of Maisch & Ropinski 2017, eq. 11, back sides those of eq. 13 and 14.
+    """
     x, n = body.mesh.positions.astype(np.float64), body.mesh.normals.astype(np.float64)
     factors = FormFactors(body.stage.gpu, body.mesh, body.material.profile)
     light = np.stack(L_d).astype(np.float64)
-    found = np.zeros((len(light), len(receivers), 3))
+    totals = np.zeros((len(light), len(receivers), 3))
     at_once = max(PAIRS // len(x), 1)
     for first in trange(0, len(receivers), at_once, desc="sums over all senders", disable=None):
         o = receivers[first : first + at_once]
@@ -81,16 +84,16 @@ def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.nda
         K = factors.of(np.stack([o[row], i], axis=1)).astype(np.float64)
         starts = np.searchsorted(row, np.arange(len(o) + 1))
         for k, (a, b) in enumerate(pairwise(starts), first):
-            found[:, k] = np.einsum("kc,lkc->lc", K[a:b], light[:, i[a:b]])
-    return found
+            totals[:, k] = np.einsum("kc,lkc->lc", K[a:b], light[:, i[a:b]])
+    return totals
 
 
 def M_back(stage: Stage, method: SpatialAdjacencyMaps) -> np.ndarray:
-    """(V, 3), W/m^2: of the first object, at its vertices."""
+    """Render M_back, W/m^2 (V, 3), at the vertices of the first object."""
     graph, body = Graph(stage.gpu), stage.bodies[0]
     plan = method.plan(body)
     if plan is None:  # nothing shines through
         return np.zeros((len(body.mesh.positions), 3))
-    found = method.at_vertices(begin(graph, stage, (8, 8)), body, plan)
-    graph.run(found)
-    return graph.read(found)[:, :3]
+    values = method.at_vertices(begin(graph, stage, (8, 8)), body, plan)
+    graph.run(values)
+    return graph.read(values)[:, :3]

@@ -29,7 +29,7 @@ MAPS = tuple((select, samples) for select in ("top", "fit") for samples in (3, 8
 
 
 def flicker(M: np.ndarray) -> float:
-    """Of M (frames, vertices, 3)."""
+    """Compute the flicker of M (frames, vertices, 3)."""
     return float(np.sqrt(np.square(np.diff(M, n=2, axis=0)).mean() / np.square(M).mean()))
 
 
@@ -38,11 +38,11 @@ def main(argv: list[str] | None = None) -> None:
     add = parser.add_argument
     add("scene", nargs="?", default="statue", help="a built-in scene")
     add("--vertices", type=int, default=20_000)
-    add("--receivers", type=int, default=500, help="vertices whose M_back is followed")
+    add("--receivers", type=int, default=500, help="number of vertices at which M_back is measured")
     add("--rate", type=int, default=60, help="frames per second")
     args = parser.parse_args(argv)
 
-    scene = load_scene(args.scene, vertices=args.vertices).at(0.0)  # nothing but the light moves
+    scene = load_scene(args.scene, vertices=args.vertices).at(0.0)  # only the light moves
     stage = Stage(default_gpu(), scene)
     body = stage.bodies[0]
     times = np.arange(round(args.rate * SECONDS) + 1) / args.rate
@@ -50,18 +50,18 @@ def main(argv: list[str] | None = None) -> None:
     chosen = np.sort(np.random.default_rng(1).permutation(len(everywhere.face))[: args.receivers])
 
     def shine(time_s: float) -> None:
-        """Turn the sun to where it is at a time."""
+        """Turn the sun to its direction at a time."""
         angle = math.radians(150.0 + TURN * time_s / SECONDS)
         sun = DirectionalLight((math.sin(angle), -0.4, -math.cos(angle)), (1, 1, 1))
         stage.rest = replace(scene, lights=(sun,))
 
     def frames(label: str, look: Callable[[], np.ndarray], *, blended: bool) -> np.ndarray:
-        found = []
+        values = []
         for time_s in tqdm(times, desc=label, disable=None):
             shine(time_s)
             stage.pose(time_s if blended else 0.0)  # frames of one time are not blended
-            found.append(look())
-        return np.array(found)
+            values.append(look())
+        return np.array(values)
 
     light = frames("light", lambda: irradiance_at(body, everywhere), blended=False)
     truth = sums(body, light, chosen)[times >= SETTLED]

@@ -20,16 +20,16 @@ def main(argv: list[str] | None = None) -> None:
     add("--vertices", nargs="+", type=int, default=[5000, 10_000, 20_000, 40_000, 80_000])
     add("--samples", type=int, default=3)
     add("--select", nargs="+", default=["top", "fit"])
-    add("--receivers", type=int, default=1000, help="vertices at which M_back is compared")
+    add("--receivers", type=int, default=1000, help="number of vertices at which M_back is compared")
     args = parser.parse_args(argv)
 
     print("vertices", *(f"{select + ', suns':>13}{'sky':>8}" for select in args.select), flush=True)
     for vertices in args.vertices:
         scene = load_scene(args.scene, vertices=vertices)
         errors = Errors(scene, args.receivers)
-        found = [errors.of(select, args.samples) for select in args.select]
+        pairs = [errors.of(select, args.samples) for select in args.select]
         V = len(scene.objects[0].mesh.positions)
-        print(f"{V:8}", *(f"{suns:13.3f}{sky:8.3f}" for suns, sky in found), flush=True)
+        print(f"{V:8}", *(f"{suns:13.3f}{sky:8.3f}" for suns, sky in pairs), flush=True)
 
 
 if __name__ == "__main__":

@@ -32,9 +32,9 @@ TAPS = (9, 17, 33, 65)
 
 
 def error_of_kernel(kernel: str, skin: SumOfGaussians, degrees: float) -> float:
-    """Of the kernel's response to an edge, whatever takes it to pixels."""
+    """Compute the error of the kernel's response to an edge by quadrature, without pixels."""
     t = np.linspace(-8.0, 8.0, 801)[:, None]
-    a = np.radians(max(degrees, 90.0 - degrees))  # both ways are the same, and this one needs no fine steps
+    a = np.radians(max(degrees, 90.0 - degrees))  # same error, and fewer steps are needed
     response = np.zeros(len(t))
     for term in KERNELS[kernel](skin):
         x, within = term.x, term.within[:, 0]
@@ -47,7 +47,7 @@ def error_of_kernel(kernel: str, skin: SumOfGaussians, degrees: float) -> float:
 
 
 def floor(skin: SumOfGaussians, pixels_per_mm: float, side: float = 60.0) -> Object:
-    """A square that faces up, white where x > 0 and black elsewhere; between them a ramp as wide as a pixel."""
+    """Return a square that faces up: white where x > 0, black elsewhere, with a ramp of one pixel between."""
     t = side / 2
     corners = np.array([[-t, 0, t], [t, 0, t], [t, 0, -t], [-t, 0, -t]], np.float32)
     faces, uvs = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
@@ -66,27 +66,27 @@ def floor(skin: SumOfGaussians, pixels_per_mm: float, side: float = 60.0) -> Obj
 
 
 def scene(skin: SumOfGaussians, degrees: float, pixels_per_mm: float, size: int) -> Scene:
-    """The floor from above, turned."""
+    """Return a scene that shows the floor from above, turned by an angle."""
     up = (np.sin(np.radians(degrees)), 0, -np.cos(np.radians(degrees)))
     camera = OrthographicCamera((0, 50, 0), (0, 0, 0), up=up, height=size / pixels_per_mm)
     return Scene("edge", (floor(skin, pixels_per_mm),), (DirectionalLight((0, -1, 0), (1, 1, 1)),), camera)
 
 
 def error_of_picture(kernel: str, skin: SumOfGaussians, degrees: float, pixels_per_mm: float, size: int) -> float:
-    """Of the method as it draws the edge, in the middle of the picture."""
+    """Render the edge and return the largest error in the middle of the picture."""
     where = scene(skin, degrees, pixels_per_mm, size)
     method = make_method("screen+none", {"kernel": kernel, "taps": 17})
-    found = Renderer(where, method, (size, size)).frame(aovs=["M_front"], timed=False)
+    image = Renderer(where, method, (size, size)).frame(aovs=["M_front"], timed=False)
     t = (np.arange(size) + 0.5 - size / 2) / pixels_per_mm
     a = np.radians(degrees)
     x = t * np.cos(a) - t[:, None] * np.sin(a)
-    error = np.abs(found.aovs["M_front"][..., 0] - skin.step_response(x)[..., 0])
+    error = np.abs(image.aovs["M_front"][..., 0] - skin.step_response(x)[..., 0])
     margin = size // 4
     return float(error[margin:-margin, margin:-margin].max())
 
 
 def costs(size: int, rounds: int) -> list[tuple[int, float]]:
-    """Milliseconds of the two blurs at each number of taps: the median over rounds, of all taps each."""
+    """Measure the median time of both blurs, in ms, for each number of taps."""
     gpu = default_gpu()
     where = scene(SKIN_GAUSSIANS, 0.0, 16.0, size)
     renderers = {n: Renderer(where, make_method("screen+none", {"taps": n}), (size, size), gpu) for n in TAPS}
@@ -94,13 +94,13 @@ def costs(size: int, rounds: int) -> list[tuple[int, float]]:
     for number in range(rounds + 1):
         for n, renderer in renderers.items():
             passes = renderer.frame().graph.times
-            if number:  # the first compiles
+            if number:  # the first round compiles shaders
                 times[n].append(sum(ms for name, ms in passes.items() if name.startswith("screen_space/blur")))
     return [(n, statistics.median(runs)) for n, runs in times.items()]
 
 
 def plot(angles: list[float], exact: dict, drawn: dict, path: Path) -> None:
-    """Errors over the angle: of kernels as lines, of pictures as dots."""
+    """Plot errors over the angle: kernels as lines, pictures as dots."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.0, 3.8), layout="constrained")
@@ -124,8 +124,8 @@ def main(argv: list[str] | None = None) -> None:
     add = parser.add_argument
     add("--angles", nargs="+", type=float, default=[11.25 * i for i in range(9)], help="degrees")
     add("--pixels-per-mm", type=float, default=8.0)
-    add("--size", type=int, default=192, help="of the pictures, pixels")
-    add("--rounds", type=int, default=9, help="of measuring what taps cost")
+    add("--size", type=int, default=192, help="side of the pictures, pixels")
+    add("--rounds", type=int, default=9, help="number of time measurements")
     add("-o", "--output", type=Path, default=Path("screen_space_angles.png"))
     args = parser.parse_args(argv)
 

@@ -26,13 +26,13 @@ TICK_S = 1 / 60
 
 
 def resident() -> float:
-    """Memory of this process that is not swapped out, MiB (Linux)."""
+    """Return the resident memory of this process, MiB (Linux)."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 2**20
 
 
 def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
-    """Move the pointer by one step at a time; "round" once all methods have been shown."""
+    """Move the pointer by one step at a time; yield "round" after all methods have been shown."""
     left, _, across, down = window.region
     number = 0
 
@@ -48,7 +48,7 @@ def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
             window.state.methods[1] = window.state.methods[0]
             try:
                 window.change_method(0, make_method(name))
-            except InputError:  # two that do not go together
+            except InputError:  # the two parts cannot be combined
                 continue
             point(window, "pointer_down", left + 0.25 * across, 0.5 * down)
             for level, scale in enumerate(SCALES if first else ()):
@@ -76,10 +76,10 @@ def main(argv: list[str] | None = None) -> None:
     add = parser.add_argument
     add("scene", nargs="?", default="ear", help="a built-in scene")
     add("--vertices", type=int)
-    add("--minutes", type=float, default=10.0, help="after the first round")
-    add("--orbit", type=float, default=2.0, help="seconds that each method is orbited")
-    add("--still", type=float, default=0.5, help="seconds that it is left alone")
-    add("--size", type=int, nargs=2, default=(960, 540), help="of the window")
+    add("--minutes", type=float, default=10.0, help="minutes to run after the first round")
+    add("--orbit", type=float, default=2.0, help="seconds for which each method is orbited")
+    add("--still", type=float, default=0.5, help="seconds for which each method is left alone")
+    add("--size", type=int, nargs=2, default=(960, 540), help="size of the window")
     args = parser.parse_args(argv)
 
     state = State.open(Source(args.scene, vertices=args.vertices), [make_method("lambert"), make_method("lambert")])
@@ -87,7 +87,7 @@ def main(argv: list[str] | None = None) -> None:
     steps = hand(window, args.orbit, args.still)
     frames: list[str] = []
     rounds: list[tuple[float, float]] = []
-    """seconds and MiB at the end of each"""
+    """seconds and MiB at the end of each round"""
     started = time.perf_counter()
     print("round  minutes  frames  MiB     grown")
 
