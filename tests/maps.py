@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss.bake.sam import Entries
-from wgsss.bake.sam.tree import tree
+from wgsss.bake.sam import SenderMap
+from wgsss.bake.sam.point_tree import point_tree
 from wgsss.graph import Graph
 from wgsss.methods.sam import method as sam
 from wgsss.methods.sam.method import SpatialAdjacencyMaps
@@ -27,20 +27,20 @@ def rms(values: Any) -> float:
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def random_entries(mesh: Mesh, samples: int = 5, *, few: bool = False) -> Entries:
+def random_sender_map(mesh: Mesh, samples: int = 5, *, few: bool = False) -> SenderMap:
     """Weights of vertices and nodes: of any, or of few, which few vertices have."""
     random = np.random.default_rng(4)
-    V, over = len(mesh.positions), tree(mesh.positions)
+    V, over = len(mesh.positions), point_tree(mesh.positions)
     sender = random.integers(-1, V + len(over.first), (V, samples))
     if few:
         finest = V + random.integers(0, over.levels[1], (V, samples))
         sender = np.where(random.random((V, samples)) < 0.5, sender % 7, V + finest % 11)
         sender[random.random(V) < 0.8] = -1
     weight = random.random((V, samples, 3)) * (sender >= 0)[..., None]
-    return Entries(sender.astype(np.int32), weight.astype(np.float32), V, None, over)
+    return SenderMap(sender.astype(np.int32), weight.astype(np.float32), V, None, over)
 
 
-def given(monkeypatch, make):
+def use_sender_map(monkeypatch, make):
     """Maps that are made by `make(mesh)`."""
     calls = []
 

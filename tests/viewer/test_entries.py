@@ -31,9 +31,9 @@ def test_lines_of_means_go_to_their_middles(gpu: Gpu) -> None:
     maps = adjacency(make_method("sam", {"select": "fit"}))
     assert maps is not None
     entries, body = maps.map(stage.bodies[0]), stage.bodies[0]
-    assert entries.tree is not None and entries.blend is not None
-    vertex, slot = np.argwhere(entries.sender[: len(entries.mix.row)] >= entries.senders)[0]
-    node = entries.blend.node[entries.sender[vertex, slot] - entries.senders, 0]
+    assert entries.tree is not None and entries.smoothed_means is not None
+    vertex, slot = np.argwhere(entries.sender[: len(entries.neighbour_mixture.row)] >= entries.sender_count)[0]
+    node = entries.smoothed_means.node[entries.sender[vertex, slot] - entries.sender_count, 0]
     first, count = entries.tree.first[node], entries.tree.count[node]
     below = body.rest.placed[entries.tree.order[first : first + count]]
     ends = links(stage, maps, body.rest.placed[vertex]).senders
@@ -45,11 +45,11 @@ def test_lines_of_a_mixture_are_of_all_that_is_in_it(gpu: Gpu) -> None:
     maps, body = adjacency(make_method("sam", {"select": "fit"})), stage.bodies[0]
     assert maps is not None
     entries = maps.map(body)
-    assert entries.mix is not None
-    even = entries.mix.of(entries.weight.sum(axis=1)).mean(axis=1)
+    assert entries.neighbour_mixture is not None
+    even = entries.neighbour_mixture.apply(entries.weight.sum(axis=1)).mean(axis=1)
     vertex = int(even.argmax())
     found = links(stage, maps, body.rest.placed[vertex])
-    read = entries.sender[entries.mix.row[vertex][entries.mix.weight[vertex] > 0.0]]
+    read = entries.sender[entries.neighbour_mixture.row[vertex][entries.neighbour_mixture.weight[vertex] > 0.0]]
     assert len(found.weights) == len(np.unique(read[read >= 0])) > 3
     np.testing.assert_allclose(found.weights.sum(), even[vertex], rtol=1e-3)
 

@@ -47,15 +47,18 @@ def links(stage: Stage, maps: Adjacency, point: Any) -> Links:
     body, vertex = stage.bodies[index], nearest(index)[1]
     entries, matrix = maps.map(body), body.rest.matrix
     rows, parts = np.array([vertex]), np.ones((1, 3))
-    if entries.mix is not None:
-        rows, parts = entries.mix.row[vertex], entries.mix.weight[vertex, :, None] * entries.mix.tint[vertex]
+    if entries.neighbour_mixture is not None:
+        rows, parts = (
+            entries.neighbour_mixture.row[vertex],
+            entries.neighbour_mixture.weight[vertex, :, None] * entries.neighbour_mixture.tint[vertex],
+        )
     weight = (entries.weight[rows] * parts[:, None]).mean(axis=2)
     used = weight > 0.0
     sender, at_once = np.unique(entries.sender[rows][used], return_inverse=True)
     weights = np.bincount(at_once.ravel(), weight[used], len(sender))
-    if entries.blend is not None:  # of a blend, the node that it takes the place of
-        node = entries.blend.node[np.maximum(sender - entries.senders, 0), 0]
-        sender = np.where(sender < entries.senders, sender, entries.senders + node)
+    if entries.smoothed_means is not None:  # of a blend, the node that it takes the place of
+        node = entries.smoothed_means.node[np.maximum(sender - entries.sender_count, 0), 0]
+        sender = np.where(sender < entries.sender_count, sender, entries.sender_count + node)
     places = stage.shared(("places", id(entries)), lambda: places_at_rest(body.rest.mesh, entries)["position"])
     at = places[sender] @ matrix[:3, :3].T + matrix[:3, 3]
     return Links(body.rest.placed[vertex], at, weights)

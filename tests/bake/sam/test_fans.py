@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wgsss.bake.sam.fan_quadrature import Fans
-from wgsss.bake.sam.fans import adjacency, fan_areas, kites
+from wgsss.bake.sam.fans import fan_areas, fan_quads, one_ring
 from wgsss.scene import Mesh
 from wgsss.scene.shapes import ear, slab
 
@@ -30,12 +30,12 @@ def test_fans_share_out_the_mesh_open_ones_too() -> None:
 
 
 def test_neighbours_are_those_along_edges_each_once() -> None:
-    found = adjacency(SHEET)
+    found = one_ring(SHEET)
     around = [found.vertex[a:b].tolist() for a, b in zip(found.start, found.start[1:], strict=False)]
     assert around == [[1, 2, 3], [0, 2], [0, 1, 3], [0, 2], []]
     mesh = ear(1000)
     edges = {(int(f[i]), int(f[j])) for f in mesh.faces for i in range(3) for j in range(3) if i != j}
-    found = adjacency(mesh)
+    found = one_ring(mesh)
     owner = np.repeat(np.arange(len(mesh.positions)), np.diff(found.start))
     assert len(owner) == len(edges)
     assert set(zip(owner.tolist(), found.vertex.tolist(), strict=True)) == edges
@@ -43,7 +43,7 @@ def test_neighbours_are_those_along_edges_each_once() -> None:
 
 def test_quads_hold_the_points_whose_largest_coordinate_is_the_vertexs() -> None:
     mesh = ear(1000)
-    made = kites(mesh)
+    made = fan_quads(mesh)
     vertex = 123
     for k in range(made.start[vertex], made.start[vertex + 1]):
         face, corner = divmod(int(made.corner[k]), 3)

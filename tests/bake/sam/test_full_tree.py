@@ -6,7 +6,7 @@ import numpy as np
 
 from wgsss.bake.sam.fit.select import FAINTEST
 from wgsss.bake.sam.form_factors import form_factors
-from wgsss.bake.sam.full_tree import everything
+from wgsss.bake.sam.full_tree import full_tree
 from wgsss.scene import MATERIALS, Mesh
 from wgsss.scene.shapes import slab
 
@@ -24,7 +24,7 @@ def test_a_wedge_is_received_through_where_it_is_thin(gpu):
     K = form_factors(gpu, mesh, PROFILE, np.stack([receiver, sender], axis=1))
     total = np.stack([np.bincount(receiver, K[:, c], len(x)) for c in range(3)], axis=1)
 
-    found = everything(gpu, mesh, PROFILE)
+    found = full_tree(gpu, mesh, PROFILE)
     share = (total / PROFILE.total).max(axis=1)
     received = (found.sender >= 0).all(axis=1)
     assert received[share > 1.2 * FAINTEST].all() and not received[share < 0.8 * FAINTEST].any()

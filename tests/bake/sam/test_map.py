@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from wgsss.bake import sam as module
-from wgsss.bake.sam import SELECTIONS, Entries, spatial_adjacency_map
-from wgsss.bake.sam.mesh_checks import concerns
-from wgsss.bake.sam.tree import tree
+from wgsss.bake.sam import SELECTIONS, SenderMap, spatial_adjacency_map
+from wgsss.bake.sam.mesh_checks import topology_warning
+from wgsss.bake.sam.point_tree import point_tree
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
@@ -28,7 +28,7 @@ def joined(*meshes: Mesh) -> Mesh:
     return Mesh(np.concatenate([m.positions for m in meshes]), np.concatenate(faces))
 
 
-def same(a: Entries, b: Entries) -> None:
+def same(a: SenderMap, b: SenderMap) -> None:
     found, wanted = a.arrays(), b.arrays()
     assert found.keys() == wanted.keys()
     for name, value in found.items():
@@ -38,10 +38,12 @@ def same(a: Entries, b: Entries) -> None:
 def test_entries_come_back_from_arrays_as_they_were() -> None:
     sender, weight = np.array([[0, 5]], np.int32), np.ones((1, 2, 3), np.float32)
     samples = Samples(np.array([3], np.int32), np.array([[0.2, 0.3, 0.5]]), np.array([1.0]))
-    for made in (Entries(sender, weight, 1), Entries(sender, weight, 1, samples, tree(np.zeros((9, 2))))):
-        back = Entries.of(made.arrays())
+    for made in (SenderMap(sender, weight, 1), SenderMap(sender, weight, 1, samples, point_tree(np.zeros((9, 2))))):
+        back = SenderMap.from_arrays(made.arrays())
         same(back, made)
-        assert (back.samples is None) == (made.samples is None) and (back.tree is None) == (made.tree is None)
+        assert (back.sender_samples is None) == (made.sender_samples is None) and (back.tree is None) == (
+            made.tree is None
+        )
 
 
 @pytest.mark.parametrize("select", ["top", "coarse"])
@@ -51,7 +53,7 @@ def test_a_map_is_made_once_for_each_mesh_profile_and_number(
     made = []
     original = SELECTIONS[select]
 
-    def counting(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
+    def counting(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> SenderMap:
         made.append(n)
         return original(gpu, mesh, profile, n)
 
@@ -72,7 +74,7 @@ def test_a_map_is_made_once_for_each_mesh_profile_and_number(
 
 
 def test_what_makes_a_map_is_part_of_its_key() -> None:
-    assert set(module._CODE) == {*SELECTIONS, "everything"}
+    assert set(module._CODE) == {*SELECTIONS, "full_tree"}
 
 
 @pytest.mark.parametrize(
@@ -93,7 +95,7 @@ def test_what_makes_a_map_is_part_of_its_key() -> None:
     ],
 )
 def test_meshes_on_which_the_split_means_little_are_told_in_a_line(gpu: Gpu, mesh: Mesh, told: str) -> None:
-    assert re.fullmatch(told, concerns(mesh))
+    assert re.fullmatch(told, topology_warning(mesh))
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         spatial_adjacency_map(gpu, mesh, MILK, 3, "top")
@@ -104,7 +106,7 @@ def test_meshes_on_which_the_split_means_little_are_told_in_a_line(gpu: Gpu, mes
 
 def test_isolated_vertices_are_no_part_and_get_no_entries(gpu: Gpu) -> None:
     mesh = Mesh(np.concatenate([BALL.positions, [[0, 0, 9]]]), BALL.faces)
-    assert concerns(mesh) == ""
+    assert topology_warning(mesh) == ""
     for select in ("top", "coarse"):
         found = spatial_adjacency_map(gpu, mesh, MILK, 3, select)
         assert (found.sender[-1] == -1).all() and (found.weight[-1] == 0).all() and (found.sender[:-1] >= 0).any()

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.fit.patch_form_factors import QuickFormFactors
 from wgsss.bake.sam.form_factors import form_factors
-from wgsss.bake.sam.sender_tree import near_pairs, reaching, senders
+from wgsss.bake.sam.patch_form_factors import PatchFormFactors, near_pairs
+from wgsss.bake.sam.receiver_patches import reaching_senders
+from wgsss.bake.sam.sender_tree import sender_tree
 from wgsss.scene import MATERIALS
 from wgsss.scene.shapes import ear, gyroid, slab
 
@@ -25,11 +26,11 @@ def behind(mesh, o: int) -> np.ndarray:
 def test_they_sum_to_the_form_factors_of_all(gpu, mesh):
     """Under light from one side, within 2 % RMS of fans integrated one by one, and 1 % in all."""
     V = len(mesh.positions)
-    s, K = senders(mesh, 10.0), QuickFormFactors(gpu, mesh, PROFILE)
+    s, K = sender_tree(mesh, 10.0), PatchFormFactors(gpu, mesh, PROFILE)
     light = np.maximum(mesh.normals @ np.array([0.6, 0.0, 0.8], np.float32), 0.0)
     means = np.concatenate([light, s.tree.sums(light * s.area[:V]) / s.area[V:]])
     patches = np.arange(s.tree.levels[1], s.tree.levels[2])
-    patch, node = reaching(s, K, V + patches)
+    patch, node = reaching_senders(s, K, V + patches)
     some = np.random.default_rng(0).choice(len(patches), 12, replace=False)
     found, wanted = [], []
     for p in some:
@@ -47,9 +48,9 @@ def test_they_sum_to_the_form_factors_of_all(gpu, mesh):
 def test_no_vertex_counts_twice_and_none_behind_is_missed(gpu):
     mesh = ear(600)
     V = len(mesh.positions)
-    s, K = senders(mesh, 10.0), QuickFormFactors(gpu, mesh, PROFILE)
+    s, K = sender_tree(mesh, 10.0), PatchFormFactors(gpu, mesh, PROFILE)
     patches = np.arange(s.tree.levels[1], s.tree.levels[2])
-    patch, node = reaching(s, K, V + patches)
+    patch, node = reaching_senders(s, K, V + patches)
     assert np.all(np.diff(patch) >= 0)
     for p in range(0, len(patches), 3):
         times = np.zeros(V, int)
@@ -74,7 +75,7 @@ def test_near_pairs_by_brute_force():
 
 
 def test_parents_and_children_agree():
-    s = senders(ear(500), 5.0)
+    s = sender_tree(ear(500), 5.0)
     V = len(s.tree.order)
     nodes = np.arange(V, len(s.area))
     child, owner = s.children(nodes)

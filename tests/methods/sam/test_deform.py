@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from maps import FRONT, MARBLE, PLAIN, SIDE, given, light_at_vertices, random_entries, rms
+from maps import FRONT, MARBLE, PLAIN, SIDE, light_at_vertices, random_sender_map, rms, use_sender_map
 from scenes import lit
 
 from wgsss import frame as shared
-from wgsss.bake.sam import Entries
+from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import form_factors as integrated
-from wgsss.bake.sam.sender_tree import senders
+from wgsss.bake.sam.sender_tree import sender_tree
 from wgsss.bake.samples import Samples
 from wgsss.errors import InputError
 from wgsss.gpu import LIMITS
@@ -102,8 +102,8 @@ def test_uniform_growth_scales_areas_and_distances(gpu):
 
 def test_places_of_nodes_and_areas_of_fans(gpu, monkeypatch):
     mesh = slab((12, 12, 2), 700)
-    entries = random_entries(mesh)
-    given(monkeypatch, lambda mesh: entries)
+    entries = random_sender_map(mesh)
+    use_sender_map(monkeypatch, lambda mesh: entries)
     found = Followed(Stage(gpu, moving(mesh, twisted)), 0.5)
     x = found.mesh.positions.astype(float)
     area = np.zeros(len(x))
@@ -128,21 +128,21 @@ def test_places_of_nodes_and_areas_of_fans(gpu, monkeypatch):
 
 def test_places_at_rest_are_those_of_a_mesh_that_does_not_move(gpu, monkeypatch):
     mesh = slab((12, 12, 2), 700)
-    for entries in (random_entries(mesh), on_faces(mesh)):
-        given(monkeypatch, lambda mesh, entries=entries: entries)
+    for entries in (random_sender_map(mesh), on_faces(mesh)):
+        use_sender_map(monkeypatch, lambda mesh, entries=entries: entries)
         found = Followed(Stage(gpu, moving(mesh, lambda x, time_s: x)), 0.5).places
         for name, values in places_at_rest(mesh, entries).items():
             np.testing.assert_allclose(found[name], values, rtol=1e-5, atol=2e-5)
 
 
 def on_faces(mesh, count=50):
-    """Entries whose senders are samples on faces."""
+    """A map whose senders are samples on faces."""
     random = np.random.default_rng(5)
     V = len(mesh.positions)
     face = random.integers(0, len(mesh.faces), count).astype(np.int32)
     samples = Samples(face, random.dirichlet((1, 1, 1), count), np.ones(count))
     sender = random.integers(-1, count, (V, 3)).astype(np.int32)
-    return Entries(
+    return SenderMap(
         sender, (random.random((V, 3, 3)) * (sender >= 0)[..., None]).astype(np.float32), count, samples, None
     )
 
@@ -150,10 +150,10 @@ def on_faces(mesh, count=50):
 def test_senders_that_are_no_vertices_follow_their_faces(gpu, monkeypatch):
     mesh, size, profile = sphere(6.0, 400), 1.2, MARBLE.profile
     entries = on_faces(mesh)
-    given(monkeypatch, lambda mesh: entries)
+    use_sender_map(monkeypatch, lambda mesh: entries)
     for size in (1.0, 1.2):
         found = Followed(Stage(gpu, moving(mesh, swollen)), size - 1.0)
-        s = entries.samples
+        s = entries.sender_samples
         x = np.einsum("nk,nkd->nd", s.barycentric, mesh.positions[mesh.faces[s.face]].astype(float))
         n = np.einsum("nk,nkd->nd", s.barycentric, mesh.normals[mesh.faces[s.face]].astype(float))
         between = x[entries.sender] - mesh.positions[:, None]
@@ -175,7 +175,7 @@ def test_weights_stay_finite_where_the_profile_vanishes(gpu, monkeypatch):
     far = np.argmin(mesh.positions @ mesh.positions.T, axis=1).astype(np.int32)[:, None]
     d = np.linalg.norm(mesh.positions - mesh.positions[far[:, 0]], axis=1)
     K = skin.profile.reflectance(d)[:, None].astype(np.float32)
-    given(monkeypatch, lambda mesh: Entries(far, K, len(far), None, None))
+    use_sender_map(monkeypatch, lambda mesh: SenderMap(far, K, len(far), None, None))
     stage = Stage(gpu, moving(mesh, lambda x, time_s: x * (1, 1, 1 - time_s), skin))
     for time_s in (0.0, 0.5, 0.99):
         found = Followed(stage, time_s)
@@ -264,7 +264,7 @@ def form_factors(mesh, profile):
 def test_maps_of_nodes_sum_all_that_is_behind(gpu, monkeypatch, apply):
     """Whatever entries there are. In even light, that is the sum of all form factors; at rest the scale makes up for
     what nodes on both sides of a horizon are off by."""
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     for light, time_s, most in ((SIDE, 0.0, 0.045), (SIDE, 0.4, 0.045), (EVEN, 0.0, 0.01), (EVEN, 0.4, 0.025)):
         found = Followed(Stage(gpu, moving(sphere(6.0, 400), apply, light=light)), time_s)
         K = form_factors(found.mesh, MARBLE.profile)
@@ -282,7 +282,7 @@ def test_what_is_summed_wants_no_senders_chosen(gpu, monkeypatch):
 
 
 def test_the_sum_is_blended_with_that_of_the_frame_before(gpu, monkeypatch):
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     scene = moving(sphere(6.0, 400), twisted)
     stage = Stage(gpu, scene)
     before, now = (Followed(stage, time_s).M for time_s in (0.3, 0.33))
@@ -295,7 +295,7 @@ def test_fans_that_nearly_touch_are_integrated_at_rest(gpu, monkeypatch):
     """A disc of 0.3 mm, whose fans are 0.7 mm wide: there areas times R_d are too much. How much stays as it bends."""
     ball, profile = sphere(6.0, 500), MARBLE.profile
     mesh = Mesh(ball.positions * (1.0, 1.0, 0.025), ball.faces)
-    given(monkeypatch, lambda mesh: replace(random_entries(mesh), tree=senders(mesh, 3.0).tree))
+    use_sender_map(monkeypatch, lambda mesh: replace(random_sender_map(mesh), tree=sender_tree(mesh, 3.0).tree))
     stage = Stage(gpu, moving(mesh, twisted))
     for time_s in (0.0, 0.2):
         found = Followed(stage, time_s)

@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from maps import FRONT, MARBLE, PLAIN, SIDE, given, light_at_vertices, random_entries, rms
+from maps import FRONT, MARBLE, PLAIN, SIDE, light_at_vertices, random_sender_map, rms, use_sender_map
 from scenes import lit, plane
 
 from wgsss import frame as shared
-from wgsss.bake.sam import Entries
+from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.errors import InputError
 from wgsss.gpu import LIMITS
@@ -62,8 +62,8 @@ class Passes:
 def test_vertices_receive_what_their_entries_read(gpu, monkeypatch, vertices, few):
     """Means over nodes as they are defined, node by node; the root is over all of the surface."""
     mesh = sphere(9.0, vertices)
-    entries, area = random_entries(mesh, few=few), fan_areas(mesh)
-    given(monkeypatch, lambda mesh: entries)
+    entries, area = random_sender_map(mesh, few=few), fan_areas(mesh)
+    use_sender_map(monkeypatch, lambda mesh: entries)
     stage = Stage(gpu, lit(SIDE, WHITE_SKY, mesh=mesh, material=MARBLE, camera=FRONT))
     found = Passes(stage)
     (M,), (read,) = found.at_vertices, found.irradiance
@@ -82,14 +82,17 @@ def test_fitted_entries_read_means_that_fade_into_their_neighbours(gpu):
     passes = Passes(stage, method)
     (M,) = passes.at_vertices
     entries, light, area = method.map(stage.bodies[0]), light_at_vertices(stage)[:, :3], fan_areas(mesh)
-    assert (entries.sender >= entries.senders).mean() > 0.3
+    assert (entries.sender >= entries.sender_count).mean() > 0.3
     means = entries.tree.sums(light * area[:, None]) / entries.tree.sums(area)[:, None]
-    read = np.concatenate([light, entries.blend.of(means)])
+    read = np.concatenate([light, entries.smoothed_means.apply(means)])
     gathered = np.einsum("vnc,vnc->vc", entries.weight, read[np.maximum(entries.sender, 0)])
     np.testing.assert_allclose(M, gathered, rtol=1e-4, atol=1e-5)
-    second = entries.mix.row >= len(mesh.positions)
-    assert (second & (entries.mix.weight > 0.0)).any(), "some have a second row"
-    mixed = np.einsum("vk,vkc->vc", entries.mix.weight.astype(float), gathered[entries.mix.row]) * entries.mix.tint
+    second = entries.neighbour_mixture.row >= len(mesh.positions)
+    assert (second & (entries.neighbour_mixture.weight > 0.0)).any(), "some have a second row"
+    mixed = (
+        np.einsum("vk,vkc->vc", entries.neighbour_mixture.weight.astype(float), gathered[entries.neighbour_mixture.row])
+        * entries.neighbour_mixture.tint
+    )
     assert mixed.max() > 0.1 and np.abs(mixed - gathered[: len(mixed)]).max() > 0.01
     np.testing.assert_allclose(passes.mixed, mixed, rtol=1e-4, atol=1e-5)
 
@@ -117,7 +120,7 @@ def test_pixels_show_what_lies_between_the_vertices(gpu, monkeypatch, mesh):
     scene = lit(SIDE, mesh=mesh, material=dyed, camera=camera)
     turned = replace(scene, objects=(replace(scene.objects[0], rotate=(20, 30, 40), translate=(1, -1, 0)),))
     stage = Stage(gpu, turned)
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     found = Passes(stage, size=(40, 30))
     graph = Graph(gpu)
     seen = _seen(shared.begin(graph, stage, (40, 30)))
@@ -132,13 +135,13 @@ def test_pixels_show_what_lies_between_the_vertices(gpu, monkeypatch, mesh):
 
 
 def test_objects_hide_each_other_and_those_of_one_mesh_and_material_share_a_map(gpu, monkeypatch):
-    calls = given(monkeypatch, random_entries)
+    calls = use_sender_map(monkeypatch, random_sender_map)
     mesh, curtain = sphere(5.0, 200), Object(plane(side=30.0), MARBLE, rotate=(90, 0, 0), translate=(-15, 0, 10))
     pair = [Object(mesh, MARBLE, translate=(x, 0, 0)) for x in (-6, 6)]
     scene = replace(lit(SIDE, camera=replace(FRONT, height=26)), objects=(*pair, curtain))
-    nothing = Entries(np.full((81, 3), -1, np.int32), np.zeros((81, 3, 3), np.float32), 81, None, None)
-    given_maps = {id(mesh): random_entries(mesh), id(curtain.mesh): nothing}
-    calls = given(monkeypatch, lambda mesh: given_maps[id(mesh)])
+    nothing = SenderMap(np.full((81, 3), -1, np.int32), np.zeros((81, 3, 3), np.float32), 81, None, None)
+    given_maps = {id(mesh): random_sender_map(mesh), id(curtain.mesh): nothing}
+    calls = use_sender_map(monkeypatch, lambda mesh: given_maps[id(mesh)])
     stage = Stage(gpu, scene)
     PLAIN.bake(stage)
     found = Passes(stage)
@@ -168,7 +171,7 @@ def brightness(stage, times, dark_until):
 
 
 def test_a_step_arrives_over_time_at_any_frame_rate(gpu, monkeypatch):
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     scene = lit(SIDE, mesh=sphere(5.0, 90), material=MARBLE, camera=FRONT)
     for rate in (60, 24, 144):
         times = np.arange(1 + rate // 6) / rate
@@ -179,7 +182,7 @@ def test_a_step_arrives_over_time_at_any_frame_rate(gpu, monkeypatch):
 
 
 def test_frames_that_are_not_after_the_last_start_anew(gpu, monkeypatch):
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     scene = lit(SIDE, mesh=sphere(5.0, 90), material=MARBLE, camera=FRONT)
     got = brightness(Stage(gpu, scene), [0.7], dark_until=0.0)
     np.testing.assert_allclose(got, 1.0, rtol=1e-6)
@@ -189,7 +192,7 @@ def test_frames_that_are_not_after_the_last_start_anew(gpu, monkeypatch):
 
 
 def test_two_objects_of_one_map_keep_their_own_light(gpu, monkeypatch):
-    given(monkeypatch, random_entries)
+    use_sender_map(monkeypatch, random_sender_map)
     mesh = sphere(5.0, 90)
     objects = (Object(mesh, MARBLE), Object(mesh, MARBLE, rotate=(0, 180, 0), translate=(12, 0, 0)))
     stage = Stage(gpu, replace(lit(DirectionalLight((-1, 0, 0), (1, 1, 1))), objects=objects))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.sam.fans import kites
+from wgsss.bake.sam.fans import fan_quads
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -37,7 +37,7 @@ class Fans:
     """The fans of a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
-        found = kites(mesh)
+        found = fan_quads(mesh)
         self.start, self.corner = found.start.astype(np.int64), found.corner
         self.positions, self.faces = mesh.positions, mesh.faces
         self._third = np.linalg.norm(mesh.face_normals, axis=1) / 6.0  # of each face's area

@@ -20,7 +20,7 @@ _CENTRE = np.array([22.0, 7.0, 7.0]) / 36.0  # of a quad, in barycentric coordin
 
 
 @dataclass(frozen=True, eq=False)
-class Adjacency:
+class OneRing:
     """The neighbours of a vertex v along edges, each once: vertex[start[v] : start[v + 1]] (000 §4.1)."""
 
     start: Array
@@ -30,7 +30,7 @@ class Adjacency:
 
 
 @dataclass(frozen=True, eq=False)
-class Kites:
+class FanQuads:
     """The quads of a vertex v, one for each face around it: start[v] to start[v + 1]."""
 
     start: Array
@@ -52,15 +52,15 @@ def fan_areas(mesh: Mesh) -> Array:
     return np.bincount(mesh.faces.ravel(), np.repeat(third, 3), len(mesh.positions))
 
 
-def adjacency(mesh: Mesh) -> Adjacency:
+def one_ring(mesh: Mesh) -> OneRing:
     """The neighbours of each vertex, by number."""
     count = len(mesh.positions)
     a, b = mesh.faces.ravel().astype(np.int64), np.roll(mesh.faces, -1, axis=1).ravel().astype(np.int64)
     edges = np.unique(np.concatenate([a * count + b, b * count + a])[np.tile(a != b, 2)])
-    return Adjacency(_starts(edges // count, count), (edges % count).astype(np.int32))
+    return OneRing(_starts(edges // count, count), (edges % count).astype(np.int32))
 
 
-def kites(mesh: Mesh) -> Kites:
+def fan_quads(mesh: Mesh) -> FanQuads:
     """The quads of each vertex, in the order of the faces."""
     at = mesh.faces.ravel()
     corner = np.argsort(at, kind="stable")
@@ -69,7 +69,7 @@ def kites(mesh: Mesh) -> Kites:
     centre = np.einsum("k,fikd->fid", _CENTRE, turned).reshape(-1, 3)
     area = np.repeat(np.linalg.norm(mesh.face_normals, axis=1) / 6.0, 3)
     start = _starts(at, len(mesh.positions))
-    return Kites(start, corner.astype(np.int32), centre[corner].astype(np.float32), area[corner].astype(np.float32))
+    return FanQuads(start, corner.astype(np.int32), centre[corner].astype(np.float32), area[corner].astype(np.float32))
 
 
 def _starts(of: Array, count: int) -> Array:

@@ -12,7 +12,7 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 
-def concerns(mesh: Mesh) -> str:
+def topology_warning(mesh: Mesh) -> str:
     """One line on what is open, non-manifold, inverted or in parts, and what comes of it; empty if nothing is."""
     start, end = mesh.faces.ravel().astype(np.int64), np.roll(mesh.faces, -1, axis=1).ravel().astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)

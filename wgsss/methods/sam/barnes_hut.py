@@ -18,7 +18,7 @@ import numpy.typing as npt
 from wgsss import frame as shared
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
-from wgsss.bake.sam.sender_tree import ORDER, near_pairs
+from wgsss.bake.sam.patch_form_factors import ORDER, near_pairs
 from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.frame import Frame
 from wgsss.graph import Graph, Handle
@@ -54,7 +54,7 @@ def _sum(graph: Graph, body: Body, plan: Plan, constants: Any = None, kept: floa
     tree, held = plan.entries.tree, deforming(body, plan)
     assert tree is not None
     levels = np.zeros((_LEVELS, 4), np.uint32)
-    levels[: len(tree.levels) - 1, 0] = plan.entries.senders + tree.levels[:-1]
+    levels[: len(tree.levels) - 1, 0] = plan.entries.sender_count + tree.levels[:-1]
     params = {"levels": levels, "top": len(tree.levels) - 2, "low": held.low, "steps": held.steps, "kept": kept}
     found: Handle = graph.dispatch(
         "sam/sum",

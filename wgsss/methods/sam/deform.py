@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam import Entries
-from wgsss.bake.sam.fans import adjacency, fan_areas
+from wgsss.bake.sam import SenderMap
+from wgsss.bake.sam.fans import fan_areas, one_ring
 from wgsss.graph import Graph
 from wgsss.methods.sam.upload import Plan, over_nodes
 from wgsss.optics import Profile
@@ -70,16 +70,16 @@ def deforming(body: Body, plan: Plan) -> Deforming:
     return found
 
 
-def _neighbours(mesh: Mesh, entries: Entries) -> Array:
+def _neighbours(mesh: Mesh, entries: SenderMap) -> Array:
     """uint32: where each sender's neighbours begin, and the end, then those: of a sample the nearest on its side."""
-    if entries.samples is None:
-        next_to = adjacency(mesh)
+    if entries.sender_samples is None:
+        next_to = one_ring(mesh)
         start, found = next_to.start, next_to.vertex
     else:
         from scipy.spatial import KDTree
 
         rest = places_at_rest(mesh, entries)
-        x, n = (rest[name][: entries.senders] for name in ("position", "normal"))
+        x, n = (rest[name][: entries.sender_count] for name in ("position", "normal"))
         k = min(_NEIGHBOURS + 1, len(x))
         near = KDTree(x).query(x, k=[*range(1, k + 1)])[1]
         beside = (near != np.arange(len(x))[:, None]) & (np.einsum("sd,skd->sk", n, n[near]) > 0.0)
@@ -96,10 +96,10 @@ def log_table(profile: Profile, diagonal: float) -> tuple[float, float, Array]:
     return float(low), (_TABLE - 1) / float(high - low), table
 
 
-def places_at_rest(mesh: Mesh, entries: Entries) -> dict[str, Array]:
+def places_at_rest(mesh: Mesh, entries: SenderMap) -> dict[str, Array]:
     """The fields of struct Place for a map's senders, its nodes, and its receivers where those are no senders."""
     positions, normals = mesh.positions.astype(np.float64), mesh.normals
-    samples = entries.samples
+    samples = entries.sender_samples
     if samples is not None:
         corners = mesh.faces[samples.face]
         position = np.einsum("nk,nkd->nd", samples.barycentric, positions[corners])
@@ -111,7 +111,7 @@ def places_at_rest(mesh: Mesh, entries: Entries) -> dict[str, Array]:
     else:
         area = fan_areas(mesh)
     found = {"position": positions, "area": area, "normal": normals, "variance": np.zeros(len(area))}
-    tree, end = entries.tree, entries.senders
+    tree, end = entries.tree, entries.sender_count
     if tree is None:
         return found
     weight = np.maximum(area[:end], 1e-20)
@@ -124,15 +124,15 @@ def places_at_rest(mesh: Mesh, entries: Entries) -> dict[str, Array]:
     return {name: np.concatenate([found[name][:end], nodes[name], found[name][end:]]) for name in found}
 
 
-def _triangles(mesh: Mesh, entries: Entries) -> tuple[Array, Array]:
+def _triangles(mesh: Mesh, entries: SenderMap) -> tuple[Array, Array]:
     """The triangles around a map's points: where they begin (n + 1,) among corners (k,), which are points."""
-    if entries.samples is None:
+    if entries.sender_samples is None:
         order = np.argsort(mesh.faces.ravel(), kind="stable")
         count = np.bincount(mesh.faces.ravel(), minlength=len(mesh.positions))
         faces = mesh.faces[order // 3]
     else:
-        count = np.repeat([1, 0], [entries.senders, len(mesh.positions)])
-        faces = mesh.faces[entries.samples.face] + entries.senders
+        count = np.repeat([1, 0], [entries.sender_count, len(mesh.positions)])
+        faces = mesh.faces[entries.sender_samples.face] + entries.sender_count
     return 3 * np.append(0, np.cumsum(count)), faces.ravel()
 
 
@@ -162,9 +162,9 @@ def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> 
         "low": held.low,
         "steps": held.steps,
         "samples": entries.sender.shape[1],
-        "receivers": 0 if entries.samples is None else entries.senders,
+        "receivers": 0 if entries.sender_samples is None else entries.sender_count,
         "anew": anew,
-        "even": entries.samples is not None,
+        "even": entries.sender_samples is not None,
     }
     places = posed(graph, body, plan, points).places
     return [

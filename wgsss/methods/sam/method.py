@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from wgsss import frame as shared
-from wgsss.bake.sam import SELECTIONS, Entries, map_of_everything, spatial_adjacency_map
+from wgsss.bake.sam import SELECTIONS, SenderMap, full_sender_tree, spatial_adjacency_map
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.lambert import Lambert
@@ -54,12 +54,12 @@ class Adjacency:
         for body in stage.bodies:
             self.map(body)
 
-    def map(self, body: Body) -> Entries:
+    def map(self, body: Body) -> SenderMap:
         """The spatial adjacency map of a body at rest."""
         mesh, stage, profile = body.rest.mesh, body.stage, body.material.profile
         key = ("sam", id(mesh), id(body.material))
         if self.select == "fit" and body.rest.motion is not None:
-            return stage.shared(key, lambda: map_of_everything(stage.gpu, mesh, profile))
+            return stage.shared(key, lambda: full_sender_tree(stage.gpu, mesh, profile))
         return stage.shared(
             (*key, self.samples, self.select),
             lambda: spatial_adjacency_map(stage.gpu, mesh, profile, self.samples, self.select),
@@ -107,7 +107,7 @@ class Adjacency:
                 return sum_behind(frame, body, plan, points, last.M_back, kept)
             entries = follow(graph, body, plan, points, anew=passed == 0.0)
         senders, nodes = len(plan.points.face), plan.nodes
-        blend = plan.entries.blend
+        blend = plan.entries.smoothed_means
         blended = 0 if blend is None else len(blend.node)
         irradiance = shared.irradiance_points(frame, body, points, senders + nodes + blended, plan.points)
         irradiance = over_nodes(graph, plan, "sam/means", "irradiance", irradiance=irradiance, area=plan.area)

@@ -11,11 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam import Entries
+from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.fit.neighbour_mixture import MIX_BYTES, Mix
-from wgsss.bake.sam.fit.smoothed_means import Blend
-from wgsss.bake.sam.sender_map import BYTES
+from wgsss.bake.sam.sender_map import ENTRY_BYTES, MIXTURE_BYTES, NeighbourMixture, SmoothedMeans
 from wgsss.bake.samples import Samples
 from wgsss.gpu import LIMITS, Gpu
 from wgsss.graph import Graph
@@ -54,7 +52,7 @@ class Mixes:
 class Plan:
     """A map, less what nobody sends or receives."""
 
-    entries: Entries
+    entries: SenderMap
     points: Samples
     """what L_d is wanted at: the senders that count, in whose order entries name them; nodes follow"""
     blocks: list[Block]
@@ -77,7 +75,7 @@ class Plan:
         return 0 if self.entries.tree is None else len(self.entries.tree.first)
 
 
-def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: bool) -> Plan | None:
+def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: SenderMap, *, moving: bool) -> Plan | None:
     """Upload what a frame needs of the map of `mesh`, whose render mesh has `faces` (F, 3); None where nobody receives.
 
     Where it is `moving`, all senders count, since entries may come to read others; receivers that are no senders follow
@@ -87,18 +85,20 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
     rows, receives, tree = np.flatnonzero(gathers), gathers[:V], entries.tree
     if not len(rows):
         return None
-    needed = np.arange(entries.senders) if moving else _needed(entries)
-    samples = at_vertices(mesh) if entries.samples is None else entries.samples
+    needed = np.arange(entries.sender_count) if moving else _needed(entries)
+    samples = at_vertices(mesh) if entries.sender_samples is None else entries.sender_samples
     points = Samples(samples.face[needed], samples.barycentric[needed], samples.share[needed])
-    if moving and entries.samples is not None:
+    if moving and entries.sender_samples is not None:
         points = _joined(points, at_vertices(mesh))
-    means = 0 if tree is None else len(tree.first) if entries.blend is None else len(entries.blend.node)
-    places = np.full(entries.senders, -1, np.int32)
+    means = (
+        0 if tree is None else len(tree.first) if entries.smoothed_means is None else len(entries.smoothed_means.node)
+    )
+    places = np.full(entries.sender_count, -1, np.int32)
     places[needed] = np.arange(len(needed))
     named = np.concatenate([places, len(points.face) + np.arange(means), [-1]])  # of no sender, -1, is the last
     blocks = _blocks(gpu, rows, named[entries.sender[rows]], entries.weight[rows])
     corners = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
-    mixes = [] if entries.mix is None else _mixes(gpu, rows[rows < V], entries.mix)
+    mixes = [] if entries.neighbour_mixture is None else _mixes(gpu, rows[rows < V], entries.neighbour_mixture)
     if tree is None:
         return Plan(entries, points, blocks, corners, mixes)
     finest = tree.first[: tree.levels[1]]
@@ -111,7 +111,7 @@ def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: Entries, *, moving: b
         gpu.buffer(np.append(finest, len(tree.order)).astype(np.uint32)),
         gpu.buffer(np.maximum(places[tree.order], 0).astype(np.uint32)),  # what is not needed is in no mean that is
         gpu.buffer(fan_areas(mesh)[needed].astype(np.float32)),
-        None if entries.blend is None else _blends(gpu, entries.blend),
+        None if entries.smoothed_means is None else _blends(gpu, entries.smoothed_means),
     )
 
 
@@ -127,15 +127,15 @@ def _joined(*parts: Samples) -> Samples:
     return Samples(*(np.concatenate([vars(s)[name] for s in parts]) for name in ("face", "barycentric", "share")))
 
 
-def _needed(entries: Entries) -> Array:
+def _needed(entries: SenderMap) -> Array:
     """The senders that are read, by themselves or in a mean."""
-    is_read = np.zeros(entries.senders, bool)
-    is_read[entries.sender[(entries.sender >= 0) & (entries.sender < entries.senders)]] = True
+    is_read = np.zeros(entries.sender_count, bool)
+    is_read[entries.sender[(entries.sender >= 0) & (entries.sender < entries.sender_count)]] = True
     tree = entries.tree
     if tree is not None:
-        nodes = np.unique(entries.sender[entries.sender >= entries.senders]) - entries.senders
-        if entries.blend is not None:
-            nodes = np.unique(entries.blend.node)
+        nodes = np.unique(entries.sender[entries.sender >= entries.sender_count]) - entries.sender_count
+        if entries.smoothed_means is not None:
+            nodes = np.unique(entries.smoothed_means.node)
         edges = np.zeros(len(tree.order) + 1, np.int64)
         np.add.at(edges, tree.first[nodes], 1)
         np.add.at(edges, tree.first[nodes] + tree.count[nodes], -1)
@@ -152,14 +152,14 @@ def _blocks(gpu: Gpu, rows: Array, sender: Array, weight: Array) -> list[Block]:
             gpu.buffer(layout.pack({"weight": weight[some].reshape(-1, 3), "sender": sender[some].ravel()})),
             gpu.buffer(sender[some].astype(np.int32)),
         )
-        for some in _bindings(len(rows), BYTES * sender.shape[1])
+        for some in _bindings(len(rows), ENTRY_BYTES * sender.shape[1])
     ]
 
 
-def _mixes(gpu: Gpu, vertices: Array, mix: Mix) -> list[Mixes]:
+def _mixes(gpu: Gpu, vertices: Array, mix: NeighbourMixture) -> list[Mixes]:
     layout = wgsl.load("sam/mix").layout("array<Mix>")
     found = []
-    for some in _bindings(len(vertices), MIX_BYTES):
+    for some in _bindings(len(vertices), MIXTURE_BYTES):
         v = vertices[some]
         halves = np.concatenate([mix.weight[v], mix.tint[v]], axis=1).view(np.uint32)
         packed = layout.pack({"row": mix.row[v], "halves": halves})
@@ -173,7 +173,7 @@ def _bindings(count: int, size: int) -> Iterator[slice]:
     return (slice(first, first + most) for first in range(0, count, most))
 
 
-def _blends(gpu: Gpu, blend: Blend) -> Any:
+def _blends(gpu: Gpu, blend: SmoothedMeans) -> Any:
     return gpu.buffer(wgsl.load("sam/blends").layout("array<Blend>").pack(vars(blend))) if len(blend.node) else None
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from wgsss.bake.sam.fit.batched_nnls import nonnegative
+from wgsss.bake.sam.fit.batched_nnls import batched_nnls
 
 
 @pytest.mark.parametrize("k", [1, 4, 9])
@@ -16,7 +16,7 @@ def test_nearest_of_all_that_are_not_negative(k):
     columns = rng.random((60, k, 20)) * 0.3 + rng.random((60, 1, 20))
     wanted = np.einsum("bkt,bck->bct", columns, rng.normal(size=(60, 3, k)) + 0.3)
     gram, moment = columns @ columns.transpose(0, 2, 1), columns @ wanted.transpose(0, 2, 1)
-    weight = nonnegative(gram.astype(np.float32), moment.astype(np.float32))
+    weight = batched_nnls(gram.astype(np.float32), moment.astype(np.float32))
     assert weight.shape == (60, k, 3) and weight.min() == 0.0
     off, best = np.zeros((2, 60, 3))
     for b in range(60):

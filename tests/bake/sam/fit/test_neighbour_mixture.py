@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from wgsss.bake.sam.fit.neighbour_mixture import Mix, mix
+from wgsss.bake.sam.fit.neighbour_mixture import fit_tint, neighbour_mixture
+from wgsss.bake.sam.sender_map import NeighbourMixture
 
 RNG = np.random.default_rng(11)
 LINE = np.column_stack([np.arange(12.0), np.zeros((12, 2))])
@@ -14,9 +15,11 @@ UP = np.tile((0.0, 0.0, 1.0), (12, 1))
 EVERY = np.arange(12)
 
 
-def line(seen: np.ndarray, wanted: np.ndarray, rows: np.ndarray = EVERY, owner: np.ndarray = EVERY) -> Mix:
+def line(seen: np.ndarray, wanted: np.ndarray, rows: np.ndarray = EVERY, owner: np.ndarray = EVERY) -> NeighbourMixture:
     """Of vertices in a line, one mm apart."""
-    return mix(LINE, UP, 1.0, owner, rows, lambda r: seen[r].astype(np.float32), wanted.astype(np.float32))
+    return neighbour_mixture(
+        LINE, UP, 1.0, owner, rows, lambda r: seen[r].astype(np.float32), wanted.astype(np.float32)
+    )
 
 
 def test_weights_are_the_best_of_those_that_are_not_negative():
@@ -72,10 +75,10 @@ def test_even_light_is_what_it_should_be_in_each_channel():
     even, total = RNG.random((12, 3)) + 0.5, RNG.random((12, 3)) + 0.5
     seen = RNG.random((12, 20)) + 0.2
     found = line(seen, seen)
-    found.colour(even, total)
-    found.colour(even, total)  # what it was before does not count
-    np.testing.assert_allclose(found.of(even), total, rtol=2e-3)  # halves
-    both = found.of(np.stack([even, 2.0 * even], axis=1))
+    fit_tint(found, even, total)
+    fit_tint(found, even, total)  # what it was before does not count
+    np.testing.assert_allclose(found.apply(even), total, rtol=2e-3)  # halves
+    both = found.apply(np.stack([even, 2.0 * even], axis=1))
     np.testing.assert_allclose(both, np.stack([total, 2.0 * total], axis=1), rtol=2e-3)
 
 
@@ -93,14 +96,14 @@ def test_opposite_sides_do_not_mix():
     x = np.stack([*np.meshgrid(along, along, (0.0, 0.5))], axis=-1).reshape(-1, 3)
     n = np.array([0.0, 0.0, 1.0]) * np.where(x[:, 2:] > 0.0, 1.0, -1.0)
     seen = (RNG.random((50, 30)) + 0.5).astype(np.float32)
-    found = mix(x, n, 1.0, np.arange(50), np.arange(50), lambda r: seen[r], seen)
+    found = neighbour_mixture(x, n, 1.0, np.arange(50), np.arange(50), lambda r: seen[r], seen)
     assert np.all(x[found.row, 2] == x[:, None, 2])
 
 
 def test_fewer_vertices_than_neighbours():
     seen = RNG.random((2, 10)).astype(np.float32)
-    found = mix(LINE[:2], UP[:2], 1.0, EVERY[:2], EVERY[:2], lambda r: seen[r], seen)
+    found = neighbour_mixture(LINE[:2], UP[:2], 1.0, EVERY[:2], EVERY[:2], lambda r: seen[r], seen)
     assert found.row.shape == (2, 7) and not found.weight[:, 2:].any()
     np.testing.assert_allclose(found.weight[:, 0], 1.0, atol=0.1)
     with pytest.raises(IndexError):
-        found.of(np.ones((1, 3)))
+        found.apply(np.ones((1, 3)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from wgsss.bake.sam.fit.omp import pursue
+from wgsss.bake.sam.fit.omp import omp
 
 RNG = np.random.default_rng(5)
 
@@ -31,7 +31,7 @@ def test_finds_what_a_response_is_made_of():
     seen = RNG.random((30, 80))
     weights = np.array([[0.5, 0.2, 0.1], [0.3, 0.3, 0.0], [0.7, 0.0, 0.4]])
     response = np.einsum("kt,kc->tc", seen[[4, 11, 27]], weights)[None]
-    chosen, found = pursue(*problem(seen, response), 3)
+    chosen, found = omp(*problem(seen, response), 3)
     order = np.argsort(chosen[0, 0])
     assert chosen[0, 0][order].tolist() == [4, 11, 27]
     np.testing.assert_allclose(found[0, 0][order], weights, atol=2e-3)
@@ -42,7 +42,7 @@ def test_choices_are_nearly_the_best_pairs_and_never_negative():
     response = np.einsum(
         "pc,ctk->ptk", RNG.random((12, 14)) ** 4, np.repeat(seen[..., None], 3, 2) * RNG.random((14, 1, 3))
     )
-    chosen, weight = pursue(*problem(seen, response), 2)
+    chosen, weight = omp(*problem(seen, response), 2)
     assert weight.min() >= 0.0 and np.all(chosen[0, :, 0] != chosen[0, :, 1])
     ratios = []
     for p in range(12):
@@ -58,7 +58,7 @@ def test_triples_of_candidates_that_are_much_alike():
     width = rng.choice([0.05, 0.15, 0.4], 24)
     seen = np.exp(-np.square((x - rng.random(24)[:, None]) / width[:, None])) + 0.3
     response = np.repeat((rng.random((20, 24)) ** 6 @ seen)[..., None], 3, axis=2)
-    chosen, weight = pursue(*problem(seen, response), 3)
+    chosen, weight = omp(*problem(seen, response), 3)
     ratios = []
     for p in range(20):
         best = min(best_of(seen, response[p], triple) for triple in combinations(range(24), 3))
@@ -71,7 +71,7 @@ def test_weights_are_the_best_of_their_support(n):
     """Among candidates that are alike, least squares alone would make weights negative."""
     seen = RNG.random((8, 30)) * 0.1 + RNG.random(30)
     response = (seen[0] * 3.0 - seen[1])[None, :, None] * np.ones(3)
-    chosen, weight = pursue(*problem(seen, np.maximum(response, 0.0)), n)
+    chosen, weight = omp(*problem(seen, np.maximum(response, 0.0)), n)
     found = error(seen, np.maximum(response[0], 0.0), chosen[0, 0], weight[0, 0])
     assert found < 1.05 * best_of(seen, np.maximum(response[0], 0.0), tuple(chosen[0, 0])) + 1e-6
     assert weight.min() >= 0.0
@@ -81,13 +81,13 @@ def test_a_second_look_mends_a_first_choice():
     """One candidate is nearest to the sum of two others, which together are the response."""
     a, b = np.eye(6)[0], np.eye(6)[1]
     seen = np.stack([a + b + np.eye(6)[2], a, b])
-    chosen, weight = pursue(*problem(seen, (a + b)[None, :, None] * np.ones(3)), 2)
+    chosen, weight = omp(*problem(seen, (a + b)[None, :, None] * np.ones(3)), 2)
     assert set(chosen[0, 0]) == {1, 2}
     np.testing.assert_allclose(weight, 1.0, atol=1e-3)
 
 
 def test_fewer_candidates_than_asked_for():
     seen = np.eye(4)[:2]
-    chosen, weight = pursue(*problem(seen, seen[:1, :, None] * np.ones(3)), 5)
+    chosen, weight = omp(*problem(seen, seen[:1, :, None] * np.ones(3)), 5)
     assert chosen.shape == (1, 1, 5) and weight.shape == (1, 1, 5, 3)
     np.testing.assert_allclose(weight.sum(axis=2), 1.0, atol=1e-3)

@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from wgsss.bake.sam.fit.neighbour_mixture import Mix
 from wgsss.bake.sam.fit.refit import refit
+from wgsss.bake.sam.sender_map import NeighbourMixture
 
 V, R, N, T, K = 9, 11, 2, 60, 3  # vertices, rows, entries of each, lights, rows of a mixture
 
 
-def problem(seed: int) -> tuple[Mix, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def problem(seed: int) -> tuple[NeighbourMixture, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Mixtures of three rows in turn, of entries from 20 senders; a response that others would give."""
     rng = np.random.default_rng(seed)
     row = (np.arange(V)[:, None] + np.arange(K)) % R
-    mix = Mix(row.astype(np.int32), rng.uniform(0.2, 0.5, (V, K)).astype(np.float16), np.ones((V, 3), np.float16))
+    mix = NeighbourMixture(
+        row.astype(np.int32), rng.uniform(0.2, 0.5, (V, K)).astype(np.float16), np.ones((V, 3), np.float16)
+    )
     light = rng.random((20, T)).astype(np.float32)
     sender = np.stack([rng.permutation(20)[:N] for _ in range(R)]).astype(np.int32)
     weight = rng.uniform(0.2, 1.0, (R, N, 3)).astype(np.float32)
@@ -25,7 +27,7 @@ def problem(seed: int) -> tuple[Mix, np.ndarray, np.ndarray, np.ndarray, np.ndar
     return mix, sender, weight, light, response.astype(np.float32)
 
 
-def mixed(mix: Mix, sender: np.ndarray, weight: np.ndarray, light: np.ndarray) -> np.ndarray:
+def mixed(mix: NeighbourMixture, sender: np.ndarray, weight: np.ndarray, light: np.ndarray) -> np.ndarray:
     gathered = np.einsum("vnc,vnt->vt", weight.astype(float), light[sender])
     return np.einsum("vk,vkt->vt", mix.weight.astype(float), gathered[mix.row])
 

@@ -9,8 +9,8 @@ from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.fit import select as fit
 from wgsss.bake.sam.fit.select import select_fit
 from wgsss.bake.sam.form_factors import form_factors
+from wgsss.bake.sam.patch_form_factors import near_pairs
 from wgsss.bake.sam.published.top import select_top
-from wgsss.bake.sam.sender_tree import near_pairs
 from wgsss.scene import MATERIALS
 from wgsss.scene.shapes import ear, gyroid, sphere
 
@@ -32,9 +32,9 @@ def received(entries, light: np.ndarray, area: np.ndarray) -> np.ndarray:
     at = light
     if entries.tree is not None:
         means = entries.tree.sums(light * area) / entries.tree.sums(area)
-        at = np.concatenate([light, entries.blend.of(means)])
+        at = np.concatenate([light, entries.smoothed_means.apply(means)])
     gathered = np.einsum("vn,vnc->vc", np.where(entries.sender < 0, 0.0, at[entries.sender]), entries.weight)
-    return gathered if entries.mix is None else entries.mix.of(gathered)
+    return gathered if entries.neighbour_mixture is None else entries.neighbour_mixture.apply(gathered)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_even_light_gives_all_form_factors(gpu, thin):
 def test_nothing_from_beyond_the_range(gpu):
     thick = sphere(60.0, 300)
     entries = select_fit(gpu, thick, MATERIALS["skin1"].profile, 3)
-    assert np.all(entries.sender == -1) and not entries.weight.any() and len(entries.blend.node) == 0
+    assert np.all(entries.sender == -1) and not entries.weight.any() and len(entries.smoothed_means.node) == 0
 
 
 def test_same_bits_whoever_was_first(gpu):

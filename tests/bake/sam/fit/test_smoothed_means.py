@@ -5,27 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.bake.sam.fit.smoothed_means import WIDTHS, Blend, blend
-from wgsss.bake.sam.tree import Tree, tree
+from wgsss.bake.sam.fit.smoothed_means import WIDTHS, smoothed_means
+from wgsss.bake.sam.point_tree import PointTree, point_tree
+from wgsss.bake.sam.sender_map import SmoothedMeans
 
 
 @pytest.fixture(scope="module")
-def square() -> tuple[Tree, np.ndarray, np.ndarray]:
+def square() -> tuple[PointTree, np.ndarray, np.ndarray]:
     """A tree over a square grid, its nodes' middles and areas, each point having an area of 1."""
     x = np.stack([*np.meshgrid(np.arange(32.0), np.arange(32.0)), np.zeros((32, 32))], axis=-1).reshape(-1, 3)
-    made = tree(x)
+    made = point_tree(x)
     area = made.sums(np.ones(len(x)))
     return made, made.sums(x) / area[:, None], area
 
 
 @pytest.fixture(scope="module")
-def flat(square) -> Blend:
+def flat(square) -> SmoothedMeans:
     made, x, area = square
-    return blend(made, x, np.tile((0.0, 0.0, 1.0), (len(x), 1)), area)
+    return smoothed_means(made, x, np.tile((0.0, 0.0, 1.0), (len(x), 1)), area)
 
 
 def test_what_is_even_stays_even(flat, square):
-    np.testing.assert_allclose(flat.of(np.full(len(square[2]), 2.5)), 2.5, rtol=1e-6)
+    np.testing.assert_allclose(flat.apply(np.full(len(square[2]), 2.5)), 2.5, rtol=1e-6)
     assert np.all(flat.node[:, 0] == np.tile(np.arange(len(square[2])), len(WIDTHS)))
 
 
@@ -51,7 +52,7 @@ def test_neighbours_are_of_the_same_level(flat, square):
 def test_the_other_side_of_a_sheet_does_not_count(square):
     made, x, area = square
     n = np.where((x[:, :1] < 15.0), [[0.0, 0.0, 1.0]], [[0.0, 0.0, -1.0]])
-    found = blend(made, x, n, area)
+    found = smoothed_means(made, x, n, area)
     finest = slice(0, made.levels[1])
     across = n[found.node[finest], 2] != n[finest, None, 2]
     assert found.weight[finest][across].max() < np.exp(-(1.0 + 4.0) / 2 / WIDTHS[0] ** 2) * 1.01
@@ -59,12 +60,12 @@ def test_the_other_side_of_a_sheet_does_not_count(square):
 
 def test_each_mean_is_its_own_even_where_nodes_are_at_one_place():
     x = np.zeros((64, 3))
-    made = tree(x)
-    found = blend(made, np.zeros((len(made.first), 3)), np.zeros((len(made.first), 3)), made.sums(np.ones(64)))
+    made = point_tree(x)
+    found = smoothed_means(made, np.zeros((len(made.first), 3)), np.zeros((len(made.first), 3)), made.sums(np.ones(64)))
     np.testing.assert_array_equal(found.node[: len(made.first), 0], np.arange(len(made.first)))
     assert all(len(set(row)) == 9 for row in found.node[: made.levels[1]])
 
 
 def test_a_root_alone():
-    one = blend(tree(np.zeros((1, 3))), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
+    one = smoothed_means(point_tree(np.zeros((1, 3))), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
     np.testing.assert_array_equal(one.weight[0], [1.0] + [0.0] * 8)

@@ -34,10 +34,10 @@ def test_flat_sides_are_as_evenly_covered_as_bent_ones() -> None:
 
 def test_senders_lie_on_the_mesh_and_face_as_it_does(gpu: Gpu) -> None:
     found = select_coarse(gpu, EAR, SKIN, 3)
-    simple, samples = simplified(EAR, SKIN, 3), found.samples
+    simple, samples = simplified(EAR, SKIN, 3), found.sender_samples
     assert samples is not None and found.tree is None
-    assert found.senders == len(simple.positions) == len(samples.face) < 0.2 * len(EAR.positions)
-    assert found.sender.shape == (len(EAR.positions), 3) and found.sender.max() < found.senders
+    assert found.sender_count == len(simple.positions) == len(samples.face) < 0.2 * len(EAR.positions)
+    assert found.sender.shape == (len(EAR.positions), 3) and found.sender.max() < found.sender_count
     faces = EAR.faces[samples.face]
     x = np.einsum("sk,skd->sd", samples.barycentric, EAR.positions[faces])
     n = np.einsum("sk,skd->sd", samples.barycentric, EAR.normals[faces])
@@ -50,7 +50,7 @@ def test_senders_stay_on_their_side_of_a_thin_shell(gpu: Gpu) -> None:
     outer, inner = sphere(5.0, 2000), sphere(4.93, 1900)
     faces = np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.positions)])
     shell = Mesh(np.concatenate([outer.positions, inner.positions]), faces)
-    simple, samples = simplified(shell, SKIN, 3), select_coarse(gpu, shell, SKIN, 3).samples
+    simple, samples = simplified(shell, SKIN, 3), select_coarse(gpu, shell, SKIN, 3).sender_samples
     assert samples is not None and len(simple.positions) < 1000
     n = np.einsum("sk,skd->sd", samples.barycentric, shell.normals[shell.faces[samples.face]])
     assert np.einsum("sk,sk->s", n, simple.normals).min() > 0.5
@@ -60,7 +60,7 @@ def test_the_areas_of_all_senders_sum_to_the_meshs(gpu: Gpu) -> None:
     """Where R is level all over the mesh, K is an area."""
     ball, level = sphere(5.0, 2000), SumOfGaussians(np.array([1e6]), np.ones((1, 3)))
     found = select_coarse(gpu, ball, level, 80)
-    assert found.senders < 80, "so that all are chosen by someone"
+    assert found.sender_count < 80, "so that all are chosen by someone"
     areas = found.weight[..., 0].astype(np.float64) / level.reflectance(0.0)[0]
     there = found.sender >= 0
     each = np.bincount(found.sender[there], areas[there]) / np.bincount(found.sender[there])
@@ -71,7 +71,7 @@ def test_uniform_light_through_a_plate_is_the_integral_of_a_gaussian(gpu: Gpu) -
     plate = slab(size=(30.0, 30.0, 2.0), vertices=3000)
     profile = SumOfGaussians(np.array([2.0]), np.array([[0.2, 0.4, 0.6]]))
     found = select_coarse(gpu, plate, profile, 60)
-    assert 60 < found.senders < 3000
+    assert 60 < found.sender_count < 3000
     inner = (np.abs(plate.positions[:, :2]) < 8.0).all(axis=1)
     M = found.weight[inner].sum(axis=1).mean(axis=0)  # of which a thirtieth is left out
     np.testing.assert_allclose(M, profile.total * np.exp(-(2.0**2) / 4.0), rtol=0.06)
@@ -89,7 +89,7 @@ def test_it_comes_nearer_to_the_sum_over_all_than_the_published_selection(gpu: G
     errors = []
     for select in (select_top, select_coarse):
         found = select(gpu, EAR, SKIN, 3)
-        samples = found.samples
+        samples = found.sender_samples
         L = light if samples is None else light[EAR.faces[samples.face, samples.barycentric.argmax(axis=1)]]
         M = np.einsum("onc,on->oc", found.weight[o], np.where(found.sender[o] >= 0, L[found.sender[o]], 0.0))
         errors.append(np.sqrt(np.square(M - exact).sum() / np.square(exact).sum()))

@@ -8,7 +8,7 @@ import trimesh
 
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.published import top as module
-from wgsss.bake.sam.published.top import BEYOND, Search, best, select_top
+from wgsss.bake.sam.published.top import BEYOND, SenderSearch, largest_form_factors, select_top
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene import Mesh, material
@@ -66,7 +66,7 @@ def test_they_are_those_of_a_search_through_all(gpu: Gpu, mesh: Mesh, name: str,
     K = sums(mesh, profile, receivers)
     largest = -np.sort(-K, axis=1)[:, :n]
     sender, weight = found.sender[receivers], found.weight[receivers].sum(axis=2)
-    assert found.senders == len(mesh.positions) and found.sender.shape == (found.senders, n)
+    assert found.sender_count == len(mesh.positions) and found.sender.shape == (found.sender_count, n)
     own = np.where(sender >= 0, np.take_along_axis(K, sender.astype(np.int64), axis=1), 0.0)
     unit = largest[:, :1] + 1e-12
     np.testing.assert_allclose(weight / unit, own / unit, atol=0.03)
@@ -85,7 +85,7 @@ def test_groups_that_want_more_blocks_or_turns_get_them(gpu: Gpu, monkeypatch: p
     uneven = select_top(gpu, HALF, profile, 3)
     monkeypatch.setattr(module, "_LISTED", 10_000)
     np.testing.assert_array_equal(select_top(gpu, HALF, profile, 3).sender, uneven.sender)
-    search = Search(gpu, EAR, profile, FormFactors(gpu, EAR, profile), 90)
+    search = SenderSearch(gpu, EAR, profile, FormFactors(gpu, EAR, profile), 90)
     groups = np.arange(search.blocks.receivers.stop)
     np.testing.assert_array_equal(search._best(groups, 64, 1), search._best(groups, 64, 64))
 
@@ -93,7 +93,7 @@ def test_groups_that_want_more_blocks_or_turns_get_them(gpu: Gpu, monkeypatch: p
 def test_only_some_send_and_the_others_receive(gpu: Gpu) -> None:
     profile, V = material("wholemilk").profile, len(PARTS.positions)
     sending = np.arange(V) >= V // 2
-    sender, K = best(gpu, PARTS, profile, 3, sending=sending)
+    sender, K = largest_form_factors(gpu, PARTS, profile, 3, sending=sending)
     assert (sender[sending] == -1).all() and (K[sending] == 0).all()
     receivers = np.arange(0, V // 2, 40)
     largest = -np.sort(-np.where(sending, sums(PARTS, profile, receivers), 0.0), axis=1)[:, :3]

@@ -15,7 +15,7 @@ _RETURNS = 3
 """times that what was left out is asked whether it should come back"""
 
 
-def nonnegative(gram: Array, moment: Array) -> Array:
+def batched_nnls(gram: Array, moment: Array) -> Array:
     """Weights (B, k, c), float32, at least 0, of k columns by which B times c responses are nearest.
 
     Args:

@@ -9,21 +9,19 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam.fit.batched_nnls import nonnegative
+from wgsss.bake.sam.fit.batched_nnls import batched_nnls
+from wgsss.bake.sam.sender_map import NeighbourMixture
 
 Array = npt.NDArray[Any]
 Gather = Callable[[Array], Array]
 """Gives what rows of entries (k,) gather, float32 (k, T), of T lights and all channels."""
 
-MIX_BYTES = 48
-"""of a vertex: ROWS of wgsl/sam/mix.wgsl, each a number and a half, and three halves more"""
 NEAREST = 12
 """rows among which those of a mixture are chosen: a twentieth to a tenth less error than by the nearest alone"""
 _TIES = 3e-4
@@ -33,30 +31,9 @@ _FAINT = 0.03  # of a response: what is smaller is not made as large
 _AT_ONCE = 512  # vertices
 
 
-@dataclass(frozen=True, eq=False)
-class Mix:
-    """M_back of each of V vertices as a sum of k products, `weight` times what `row` gathers, times `tint`."""
-
-    row: Array
-    """int32 (V, k)"""
-    weight: Array
-    """float16 (V, k), at least 0, without unit"""
-    tint: Array
-    """float16 (V, 3), without unit"""
-
-    def colour(self, even: Array, total: Array) -> None:
-        """Choose the tint by which `even` (R, 3), what rows gather under even light, is mixed to `total` (V, 3)."""
-        self.tint[:] = 1.0
-        mixed = self.of(even)
-        self.tint[:] = np.clip(total / np.where(mixed > 0.0, mixed, 1.0), 0.0, _MOST_TINT)
-
-    def of(self, gathered: Array) -> Array:
-        """(V, ..., 3): mixtures of what rows gather (R, ..., 3)."""
-        weight, tint = self.weight.astype(gathered.dtype), self.tint.astype(gathered.dtype)
-        return np.einsum("vk,vk...c,vc->v...c", weight, gathered[self.row], tint)
-
-
-def mix(x: Array, n: Array, spacing: float, owner: Array, rows: Array, gather: Gather, response: Array) -> Mix:
+def neighbour_mixture(
+    x: Array, n: Array, spacing: float, owner: Array, rows: Array, gather: Gather, response: Array
+) -> NeighbourMixture:
     """The mixtures that are nearest to the vertices' responses to light in the least squares, in all channels together.
 
     Args:
@@ -70,7 +47,7 @@ def mix(x: Array, n: Array, spacing: float, owner: Array, rows: Array, gather: G
     from scipy.spatial import KDTree
 
     most = wgsl.load("sam/mix").constants["ROWS"]
-    found = Mix(
+    found = NeighbourMixture(
         np.tile(np.arange(len(x), dtype=np.int32)[:, None], (1, most)),
         np.zeros((len(x), most), np.float16),
         np.ones((len(x), 3), np.float16),
@@ -91,11 +68,11 @@ def mix(x: Array, n: Array, spacing: float, owner: Array, rows: Array, gather: G
         found.row[vertices[some], : kept.shape[1]] = np.take_along_axis(among, kept, axis=1)
 
     in_blocks(choose, np.arange(len(vertices)))
-    weigh(found, vertices, gather, response)
+    solve_weights(found, vertices, gather, response)
     return found
 
 
-def weigh(found: Mix, vertices: Array, gather: Gather, response: Array) -> None:
+def solve_weights(found: NeighbourMixture, vertices: Array, gather: Gather, response: Array) -> None:
     """Choose the weights of mixtures whose rows are known, as in `mix`."""
     k = min(found.row.shape[1], len(vertices))
 
@@ -104,6 +81,13 @@ def weigh(found: Mix, vertices: Array, gather: Gather, response: Array) -> None:
         found.weight[some, :k] = scale * part
 
     in_blocks(solve, vertices)
+
+
+def fit_tint(mixture: NeighbourMixture, even: Array, total: Array) -> None:
+    """Choose the tint by which `even` (R, 3), what rows gather under even light, is mixed to `total` (V, 3)."""
+    mixture.tint[:] = 1.0
+    mixed = mixture.apply(even)
+    mixture.tint[:] = np.clip(total / np.where(mixed > 0.0, mixed, 1.0), 0.0, _MOST_TINT)
 
 
 def in_blocks(run: Callable[[Array], None], indices: Array) -> None:
@@ -124,4 +108,4 @@ def _parts(among: Array, vertices: Array, gather: Gather, response: Array) -> tu
     k = among.shape[1]
     gram = seen @ seen.transpose(0, 2, 1) + _TIES * np.eye(k, dtype=np.float32)
     moment = seen @ (wanted / np.maximum(own, 1e-30))[..., None] + np.float32(_TIES / k)
-    return nonnegative(gram, moment)[..., 0], scale
+    return batched_nnls(gram, moment)[..., 0], scale

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.sam.fit.batched_nnls import nonnegative
+from wgsss.bake.sam.fit.batched_nnls import batched_nnls
 
 Array = npt.NDArray[Any]
 
@@ -17,7 +17,7 @@ _OWN = 0.01
 """of a candidate's square, at least, that counts as not told by the other choices: less is rounding"""
 
 
-def pursue(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
+def omp(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
     """The `n` candidates, and their weights, by whose sum a response is nearest in the least squares.
 
     Args:
@@ -64,7 +64,7 @@ def pursue(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
         """Weights (rows, k) of choices, their products with each other, and by how much they lessen the error."""
         gram = np.take_along_axis(by, np.broadcast_to(there[:, None], (*there.shape, there.shape[1])), axis=2)
         moment = np.take_along_axis(wanted, there, axis=1)
-        weight = nonnegative(gram, moment[..., None])[..., 0]
+        weight = batched_nnls(gram, moment[..., None])[..., 0]
         gain = 2.0 * (weight * moment).sum(axis=1) - np.einsum("ri,rij,rj->r", weight, gram, weight)
         return weight, gram, gain
 
@@ -84,6 +84,6 @@ def pursue(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
         chosen[better], product[better], gain[better] = there[better], by[better], now[better]
     support = seen[problem[:, None], chosen]
     of_channels = response.transpose(0, 2, 3, 1).reshape(rows, T, 3)
-    weights = nonnegative(fitted(chosen, product)[1], support @ of_channels)
+    weights = batched_nnls(fitted(chosen, product)[1], support @ of_channels)
     missing = ((0, 0), (0, 0), (0, n - count))
     return np.pad(chosen.reshape(B, P, count), missing), np.pad(weights.reshape(B, P, count, 3), (*missing, (0, 0)))

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.sam.fit.batched_nnls import nonnegative
-from wgsss.bake.sam.fit.neighbour_mixture import Mix, in_blocks
-from wgsss.bake.sam.sender_map import gathered
+from wgsss.bake.sam.fit.batched_nnls import batched_nnls
+from wgsss.bake.sam.fit.neighbour_mixture import in_blocks
+from wgsss.bake.sam.sender_map import NeighbourMixture, gather_rows
 
 Array = npt.NDArray[Any]
 
@@ -17,7 +17,9 @@ _LEAST = 0.1
 """of a weight, that stays: what gathers nothing is no part of any mixture, and would not come back"""
 
 
-def refit(mix: Mix, vertices: Array, rows: Array, sender: Array, weight: Array, light: Array, response: Array) -> None:
+def refit(
+    mix: NeighbourMixture, vertices: Array, rows: Array, sender: Array, weight: Array, light: Array, response: Array
+) -> None:
     """Scale the entries of rows (k,) towards those by which mixtures are nearest to what is wanted.
 
     Args:
@@ -44,7 +46,7 @@ def refit(mix: Mix, vertices: Array, rows: Array, sender: Array, weight: Array, 
     def miss(which: Array) -> None:
         some, at = np.unique(read[which], return_inverse=True)
         there = csr_array((parts[which].data, at.ravel(), np.arange(len(which) + 1) * read.shape[1]))
-        lack[which] -= there @ gathered(sender[rows[some]], weight[rows[some]], light)
+        lack[which] -= there @ gather_rows(sender[rows[some]], weight[rows[some]], light)
 
     def scale(which: Array) -> None:
         some, cost = rows[which], price[which, None, None]
@@ -52,7 +54,7 @@ def refit(mix: Mix, vertices: Array, rows: Array, sender: Array, weight: Array, 
         gram = cost * (seen @ seen.transpose(0, 2, 1))
         gram += 1e-5 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(seen.shape[1], dtype=np.float32)
         moment = gram.sum(axis=2, keepdims=True) + seen @ (lent[which] @ lack)[..., None]
-        factor = nonnegative(gram, moment)
+        factor = batched_nnls(gram, moment)
         weight[some] *= np.where(cost > 0.0, np.maximum(factor, _LEAST), 1.0)
 
     in_blocks(miss, np.arange(len(vertices)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam.tree import Tree
+from wgsss.bake.sam.point_tree import PointTree
+from wgsss.bake.sam.sender_map import SmoothedMeans
 
 Array = npt.NDArray[Any]
 
@@ -19,25 +19,7 @@ WIDTHS = (0.7, 1.2)
 second, between one level and the next, takes a tenth off."""
 
 
-@dataclass(frozen=True, eq=False)
-class Blend:
-    """Means of nodes of a tree, each with some of those beside it."""
-
-    node: Array
-    """int32 (U, k): nodes of the tree, each mean's own first"""
-    weight: Array
-    """float32 (U, k), summing to 1; 0 where there are fewer"""
-
-    def of(self, means: Array) -> Array:
-        """(U, ...): blended means (N, ...)."""
-        return np.einsum("uk,uk...->u...", self.weight, means[self.node])
-
-    def only(self, rows: Array) -> Blend:
-        """Some of them (rows,)."""
-        return Blend(self.node[rows], self.weight[rows])
-
-
-def blend(tree: Tree, x: Array, n: Array, area: Array) -> Blend:
+def smoothed_means(tree: PointTree, x: Array, n: Array, area: Array) -> SmoothedMeans:
     """Every node of a tree with its neighbours, as wide as the first of WIDTHS, then every node as the next, and so on.
 
     `x` (N, 3) are their places, `n` (N, 3) unit normals, `area` (N,).
@@ -60,4 +42,4 @@ def blend(tree: Tree, x: Array, n: Array, area: Array) -> Blend:
         for of_width, width in zip(weight, WIDTHS, strict=True):
             of_width[a:b, :k] = np.exp(-np.square(away) / (2.0 * width**2)) * np.maximum(area[a:b], 1e-30)[near]
     weight /= weight.sum(axis=2, keepdims=True)
-    return Blend(np.tile(node, (len(WIDTHS), 1)), weight.reshape(-1, most))
+    return SmoothedMeans(np.tile(node, (len(WIDTHS), 1)), weight.reshape(-1, most))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.sam.published.top import best
-from wgsss.bake.sam.sender_map import Entries
+from wgsss.bake.sam.published.top import largest_form_factors
+from wgsss.bake.sam.sender_map import SenderMap
 from wgsss.bake.samples import Samples
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
@@ -24,7 +24,7 @@ _FEWEST = 100  # faces of a simplified mesh
 _NEAR = 16  # vertices of the mesh that are looked at for one that lies where a sender does
 
 
-def select_coarse(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
+def select_coarse(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> SenderMap:
     """The n vertices of largest K_oi on the back side among those of a simplified mesh, whose fans cover as much.
 
     They receive light where the mesh has a vertex next to them that faces the same way. The areas of their fans are
@@ -34,10 +34,10 @@ def select_coarse(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
     V = len(mesh.positions)
     faces = np.concatenate([mesh.faces, simple.faces + V])
     both = Mesh(np.concatenate([mesh.positions, simple.positions]), faces, name=mesh.name)
-    sender, K = best(gpu, both, profile, n, sending=np.arange(len(both.positions)) >= V)
+    sender, K = largest_form_factors(gpu, both, profile, n, sending=np.arange(len(both.positions)) >= V)
     found = sender[:V]
     scale = np.float32(mesh.area / simple.area)
-    return Entries(
+    return SenderMap(
         np.where(found >= 0, found - V, -1).astype(np.int32), K[:V] * scale, len(simple.positions), _on(mesh, simple)
     )
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wgsss import wgsl
 from wgsss.bake.sam.form_factors import MOST, FormFactors
 from wgsss.bake.sam.published.blocks import Blocks
-from wgsss.bake.sam.sender_map import Entries, empty
+from wgsss.bake.sam.sender_map import SenderMap, empty_entries
 from wgsss.console import progress_bar
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
@@ -31,12 +31,14 @@ _CHUNK = 1 << 11  # groups at once
 _SLOTS = 1 << 21  # of entries at once: a dispatch has 65,535 workgroups at most
 
 
-def select_top(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> Entries:
+def select_top(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> SenderMap:
     """The n vertices of largest K_oi (000 eq. 11), all channels together, on each vertex' back side (eq. 13, 14)."""
-    return Entries(*best(gpu, mesh, profile, n), len(mesh.positions))
+    return SenderMap(*largest_form_factors(gpu, mesh, profile, n), len(mesh.positions))
 
 
-def best(gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None = None) -> tuple[Array, Array]:
+def largest_form_factors(
+    gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None = None
+) -> tuple[Array, Array]:
     """Senders (V, n) and form factors (V, n, 3) of the n largest K_oi, the largest first; -1 where there are no more.
 
     Of more than n that come nearest to it by their fans' areas and mean squared distances, the n best by points of low
@@ -44,9 +46,9 @@ def best(gpu: Gpu, mesh: Mesh, profile: Profile, n: int, sending: Array | None =
     looked for. Where `sending` (V,) is given, only those vertices send, and only the others receive.
     """
 
-    sender, weight = empty(len(mesh.positions), n)
+    sender, weight = empty_entries(len(mesh.positions), n)
     factors = FormFactors(gpu, mesh, profile)
-    search = Search(gpu, mesh, profile, factors, n + 5 + n // 2, sending)
+    search = SenderSearch(gpu, mesh, profile, factors, n + 5 + n // 2, sending)
     shown: dict[str, Any] = {"desc": f"spatial adjacency map of {mesh.name}", "unit": " vertices", "unit_scale": True}
     with progress_bar(total=len(mesh.positions), **shown) as bar:
         for receivers, found in search:
@@ -68,7 +70,7 @@ def _factors(factors: FormFactors, receivers: Array, found: Array, most: int) ->
     return K
 
 
-class Search:
+class SenderSearch:
     """Goes over the vertices of a mesh, some at a time, with the `kept` best senders of each: by the area of their fans
     and R_d at the root of the mean squared distance between them. -1 where there are no more."""
 

@@ -12,7 +12,7 @@ Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class PointTree:
     """Nodes by level, from the finest, each over a range of the points in an order of their own.
 
     Node k of a level, counted from the level's first, has nodes 4 k to 4 k + 3 of the finer level as children.
@@ -34,7 +34,7 @@ class Tree:
         return before[self.first + self.count] - before[self.first]
 
 
-def tree(where: Array) -> Tree:
+def point_tree(where: Array) -> PointTree:
     """The tree of points at `where` (V, d), V at least 1. Each cut is at the median, along the axis of most spread."""
     V = len(where)
     order = np.arange(V)
@@ -51,7 +51,7 @@ def tree(where: Array) -> Tree:
         along = here[np.arange(V), spread.argmax(axis=1)[part]]
         order = order[np.lexsort((along, part))]
     cuts = [_edges(V, 4**level) for level in range(depth, -1, -1)]
-    return Tree(
+    return PointTree(
         order.astype(np.int32),
         np.cumsum([0, *(len(e) - 1 for e in cuts)]).astype(np.int32),
         np.concatenate([e[:-1] for e in cuts]).astype(np.int32),

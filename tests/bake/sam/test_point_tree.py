@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from wgsss.bake.sam.tree import Tree, tree
+from wgsss.bake.sam.point_tree import PointTree, point_tree
 
 
 @pytest.fixture(scope="module")
@@ -16,13 +16,13 @@ def points() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def made(points) -> Tree:
-    return tree(points)
+def made(points) -> PointTree:
+    return point_tree(points)
 
 
 @pytest.mark.parametrize("V", [1, 2, 3, 4, 5, 15, 16, 17, 1000])
 def test_levels_cover_all_points(V):
-    made = tree(np.random.default_rng(V).random((V, 2)))
+    made = point_tree(np.random.default_rng(V).random((V, 2)))
     assert sorted(made.order) == list(range(V))
     sizes = np.diff(made.levels)
     assert sizes[-1] == 1 and np.all(sizes[:-1] == 4 * sizes[1:])
@@ -61,6 +61,6 @@ def test_what_faces_another_way_is_elsewhere():
     """The two sides of a sheet, when normals count for more than its thickness."""
     x = np.random.default_rng(1).random((400, 2))
     side = np.repeat([-1.0, 1.0], 200)
-    made = tree(np.column_stack([x, 3.0 * side]))
+    made = point_tree(np.column_stack([x, 3.0 * side]))
     halves = np.split(side[made.order], 2)
     assert all(np.ptp(half) == 0.0 for half in halves)

@@ -8,14 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
-from wgsss.bake.sam.sender_tree import NEAR, ORDER, Senders, near_pairs
+from wgsss.bake.sam.sender_tree import SenderTree
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
+NEAR = 4.0
+"""roots of a fan's area within which form factors are integrated; a fan is some 1.2 across"""
+ORDER = 2
+"""of the points in a quad that they are integrated by"""
 BEYOND = 5e-4
 """share of the light of a plane that comes from farther away than what is looked at"""
 TAIL = 1e-5
@@ -24,11 +29,12 @@ FAINT = 2e-3
 """share of what leaves a plane in all, below which a node is not looked into"""
 NEAREST = 3.0
 """roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
+_AT_ONCE = 1 << 16  # vertices whose neighbours are found at a time
 _SHIFT = 16  # bits of a squared distance that the table of R_d leaves out: it has 128 entries each time that it doubles
 _LEAST = 1e-3  # its first distance, of what is looked at
 
 
-class QuickFormFactors:
+class PatchFormFactors:
     """K (000 eq. 11) of one mesh and profile, from senders to patches of vertices."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
@@ -56,7 +62,7 @@ class QuickFormFactors:
         """R_d, 1/mm^2, (3, ...), at the roots of `squared` (...) mm^2, float32."""
         return self._R.take(np.clip(self._entry(squared), 0, self._R.shape[1] - 1), axis=1)
 
-    def __call__(self, s: Senders, vertices: Array, senders: Array) -> Array:
+    def __call__(self, s: SenderTree, vertices: Array, senders: Array) -> Array:
         """float32 (B, 3, P, C): from senders (B, C) to vertices (B, P), 0 where they are not behind them (eq. 13, 14),
         and of those that are -1."""
         first = s.x[vertices[:, :1]]  # near them, products lose nothing
@@ -93,3 +99,29 @@ class QuickFormFactors:
 
     def _entry(self, square: Array) -> Array:
         return (square.view(np.int32) >> np.int32(_SHIFT)) - np.int32(self._first)
+
+
+def near_pairs(mesh: Mesh) -> Array:
+    """int64 (P, 2): vertices o and i, on the back side of o, whose distance is NEAR roots of the larger fan's area at
+    most; in ascending order."""
+    from scipy.spatial import KDTree
+
+    x, n, V = mesh.positions.astype(np.float64), mesh.normals, len(mesh.positions)
+    reach = NEAR * np.sqrt(fan_areas(mesh))
+    everything = KDTree(x)
+    found = []
+    order = np.argsort(reach, kind="stable")  # of those of one search, which has one radius, few have a smaller one
+    for some in np.split(order, _cuts(reach[order])):
+        pairs = KDTree(x[some]).sparse_distance_matrix(everything, reach[some[-1]], output_type="ndarray")
+        o, i = some[pairs["i"]], pairs["j"]
+        kept = (pairs["v"] <= reach[o]) & (np.einsum("pd,pd->p", n[o], n[i]) < 0.0)
+        found += [o[kept] * V + i[kept], i[kept] * V + o[kept]]
+    o, i = np.divmod(np.unique(np.concatenate(found)), V)
+    below = np.einsum("pd,pd->p", x[i] - x[o], n[o]) < 0.0
+    return np.stack([o, i], axis=1)[below]
+
+
+def _cuts(reach: Array) -> Array:
+    """Where to cut ascending reaches, so that those of a part are alike by a factor of the root of 2."""
+    octave = np.floor(2.0 * np.log2(np.maximum(reach, 1e-30)))
+    return np.flatnonzero((np.diff(octave) > 0) | (np.arange(1, len(reach)) % _AT_ONCE == 0)) + 1
