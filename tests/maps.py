@@ -1,4 +1,4 @@
-"""Spatial adjacency maps whose entries are known."""
+"""Spatial adjacency maps with known random entries, and quantities that tests of the method compare."""
 
 from __future__ import annotations
 
@@ -24,28 +24,32 @@ PLAIN = SpatialAdjacencyMaps(select="top", surface="none")
 
 
 def rms(values: Any) -> float:
+    """Return the root mean square of an array."""
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def random_sender_map(mesh: Mesh, samples: int = 5, *, few: bool = False) -> SenderMap:
-    """Weights of vertices and nodes: of any, or of few, which few vertices have."""
+def random_sender_map(mesh: Mesh, entries_per_vertex: int = 5, *, few: bool = False) -> SenderMap:
+    """Return a map whose senders are random vertices and nodes of a tree.
+
+    With `few`, only every fifth vertex has entries, and only a few vertices and finest nodes are senders.
+    """
     random = np.random.default_rng(4)
-    V, over = len(mesh.positions), point_tree(mesh.positions)
-    sender = random.integers(-1, V + len(over.first), (V, samples))
+    V, tree = len(mesh.positions), point_tree(mesh.positions)
+    sender = random.integers(-1, V + len(tree.first), (V, entries_per_vertex))
     if few:
-        finest = V + random.integers(0, over.levels[1], (V, samples))
-        sender = np.where(random.random((V, samples)) < 0.5, sender % 7, V + finest % 11)
+        finest = V + random.integers(0, tree.levels[1], (V, entries_per_vertex))
+        sender = np.where(random.random((V, entries_per_vertex)) < 0.5, sender % 7, V + finest % 11)
         sender[random.random(V) < 0.8] = -1
-    weight = random.random((V, samples, 3)) * (sender >= 0)[..., None]
-    return SenderMap(sender.astype(np.int32), weight.astype(np.float32), V, None, over)
+    weight = random.random((V, entries_per_vertex, 3)) * (sender >= 0)[..., None]
+    return SenderMap(sender.astype(np.int32), weight.astype(np.float32), V, None, tree)
 
 
 def use_sender_map(monkeypatch, make):
-    """Maps that are made by `make(mesh)`."""
+    """Let the method use `make(mesh)` as the map of each mesh; return the list of its calls."""
     calls = []
 
-    def spatial_adjacency_map(gpu, mesh, profile, samples, select):
-        calls.append((mesh, profile, samples, select))
+    def spatial_adjacency_map(gpu, mesh, profile, entries_per_vertex, select):
+        calls.append((mesh, profile, entries_per_vertex, select))
         return make(mesh)
 
     monkeypatch.setattr(sam, "spatial_adjacency_map", spatial_adjacency_map)
@@ -53,10 +57,10 @@ def use_sender_map(monkeypatch, make):
 
 
 def light_at_vertices(stage: Stage) -> Any:
-    """L_d at all vertices of the one object."""
+    """Return L_d (V, 3), W/m^2, at all vertices of the only object."""
     graph, body = Graph(stage.gpu), stage.bodies[0]
-    everywhere = at_vertices(body.rest.mesh)
-    V = len(everywhere.face)
-    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(everywhere), V, everywhere)
+    vertices = at_vertices(body.rest.mesh)
+    V = len(vertices.face)
+    light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(vertices), V, vertices)
     graph.run(light)
     return graph.read(light)[:, :3].astype(float)

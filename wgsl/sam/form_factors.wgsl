@@ -1,23 +1,23 @@
-// Sums of R_d over two fans, both as points that stand for parts of them (Maisch & Ropinski 2017, eq. 11).
+// The integral of R_d over two reduced fans, which are given as quadrature points (Maisch & Ropinski 2017, eq. 11).
 //
-// A part is taken as a point at its centroid with the squared distances to all of it: |x_i - x_o|^2 is on average that
-// between the centroids and the mean squares of both parts' extents.
+// Each point stands for a part of a fan and lies at its centroid. The mean squared distance between two parts is the
+// squared distance of their points plus the extents of both; R_d is evaluated there.
 
 import package::units::{Area, Number, Position};
 
-const SHIFT: u32 = 15u; // bits of a squared distance between the entries of the table: 256 for each time it doubles
+const SHIFT: u32 = 15u; // trailing bits of a squared distance that the table ignores: 256 entries for each doubling
 
 struct Params {
-    first_entry: u32, // of the table, as the leading bits of the squared distance
+    first_entry: u32, // leading bits of the squared distance of the table's first entry
 }
 
 struct Point {
     position: Position,
     area: Area,
-    extent: Area, // mean square of the distances to the centroid
+    extent: Area, // mean squared distance of the part from the point
 }
 
-// Some points of a receiver's fan and all of a sender's, as ranges of the points.
+// Some points of the receiver's fan, and all of the sender's, as ranges of `points`.
 struct Term {
     o_first: u32,
     o_end: u32,
@@ -29,8 +29,9 @@ struct Term {
 @group(0) @binding(1) var<storage, read> table: array<vec4f>; // R_d over the squared distance, 1/mm^2
 @group(0) @binding(2) var<storage, read> points: array<Point>;
 @group(0) @binding(3) var<storage, read> terms: array<Term>;
-@group(0) @binding(4) var<storage, read_write> sums: array<vec4f>; // of R_d dA_i dA_o, mm^2
+@group(0) @binding(4) var<storage, read_write> sums: array<vec4f>; // of R_d dA_i dA_o, mm^2, for each term
 
+// R_d at a squared distance, by linear interpolation in the table.
 fn reflectance(squared: Area) -> vec3f {
     let bits = max(bitcast<u32>(squared), params.first_entry << SHIFT);
     let entry = min((bits >> SHIFT) - params.first_entry, arrayLength(&table) - 2u);

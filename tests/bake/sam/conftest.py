@@ -1,4 +1,4 @@
-"""What is baked here without the cache, which limits BLAS to one thread, has that limit all the same."""
+"""These tests bake without the cache, which limits BLAS to one thread; here the limit is set for all of them."""
 
 from __future__ import annotations
 

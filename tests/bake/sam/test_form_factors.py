@@ -1,4 +1,4 @@
-"""Form factors between fans: against Monte Carlo and closed forms, near and far."""
+"""Form factors between fans, compared with Monte Carlo integration and closed forms, for near and distant pairs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from wgsss.optics import Profile, SumOfGaussians
 from wgsss.scene import Mesh, material
 from wgsss.scene.shapes import ear, slab
 
-# 1 mm cells on both sides of a sheet of 0.5 mm.
+# Cells 1 mm wide on both sides of a plate 0.5 mm thick.
 PLATES = slab(size=(10.0, 10.0, 0.5), vertices=300)
 
 
 def monte_carlo(mesh: Mesh, profile: Profile, o: int, i: int, count: int = 100_000) -> tuple[np.ndarray, np.ndarray]:
-    """K_oi and its standard error, by random points of both fans."""
+    """Estimate K_oi from random points of both fans; return it and its standard error."""
     random = np.random.default_rng(o + 1000 * i)
 
     def points(v: int) -> np.ndarray:
@@ -39,7 +39,7 @@ def monte_carlo(mesh: Mesh, profile: Profile, o: int, i: int, count: int = 100_0
 
 
 def opposite(mesh: Mesh, count: int, rank: int = 0) -> np.ndarray:
-    """Pairs of a vertex and the nearest, or a farther, one on its back side."""
+    """Return pairs (count, 2) of a vertex and one on its back side: the nearest for rank 0, the next for 1, ..."""
     x, n = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
     o = np.random.default_rng(3).choice(len(x), count, replace=False)
     away = x - x[o, None]
@@ -50,17 +50,16 @@ def opposite(mesh: Mesh, count: int, rank: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["skin1", "marble"])
 @pytest.mark.parametrize(("mesh", "rank"), [(PLATES, 0), (PLATES, 5), (ear(1000), 0), (ear(1000), 30)])
-def test_near_and_far_fans_are_within_a_percent_of_monte_carlo(gpu: Gpu, mesh: Mesh, rank: int, name: str) -> None:
+def test_form_factors_are_within_a_percent_of_monte_carlo(gpu: Gpu, mesh: Mesh, rank: int, name: str) -> None:
     profile, pairs = material(name).profile, opposite(mesh, 4, rank)
-    found = form_factors(gpu, mesh, profile, pairs)
-    for K, (o, i) in zip(found, pairs, strict=True):
+    for K, (o, i) in zip(form_factors(gpu, mesh, profile, pairs), pairs, strict=True):
         mean, error = monte_carlo(mesh, profile, int(o), int(i))
         lit = mean > 0.01 * mean.max()
         assert (np.abs(K - mean)[lit] < 0.01 * mean[lit] + 4.0 * error[lit]).all()
 
 
-def test_k_prime_of_near_plates_is_not_one(gpu: Gpu) -> None:
-    """000 eq. 15 and trap: over fans as far apart as they are wide, R varies."""
+def test_near_form_factors_differ_from_area_times_reflectance(gpu: Gpu) -> None:
+    """The ratio K' (Maisch & Ropinski 2017, eq. 15): R_d varies over fans that are as wide as they are far apart."""
     pairs = np.concatenate([opposite(PLATES, 60, rank) for rank in range(12)])
     pairs = pairs[(np.abs(PLATES.positions[pairs, :2]) < 4.0).all(axis=(1, 2))]  # away from the rim
     profile = material("skin1").profile
@@ -70,7 +69,7 @@ def test_k_prime_of_near_plates_is_not_one(gpu: Gpu) -> None:
     assert 0.55 < ratio.min() < 0.65 and 1.2 < ratio.max() < 2.2
 
 
-def test_all_of_an_opposite_plate_gives_the_integral_of_a_gaussian(gpu: Gpu) -> None:
+def test_form_factors_of_a_whole_plate_sum_to_the_integral_of_a_gaussian(gpu: Gpu) -> None:
     profile = SumOfGaussians(np.array([0.2, 1.0]), np.array([[0.1, 0.2, 0.3], [0.4, 0.3, 0.2]]))
     x = PLATES.positions
     middle = int(np.argmin(np.abs(x[:, :2]).sum(axis=1) + (x[:, 2] < 0)))
@@ -80,7 +79,7 @@ def test_all_of_an_opposite_plate_gives_the_integral_of_a_gaussian(gpu: Gpu) -> 
     np.testing.assert_allclose(total, through.sum(axis=0), rtol=2e-3)
 
 
-def test_each_gives_the_other_as_much(gpu: Gpu) -> None:
+def test_form_factors_times_areas_are_symmetric(gpu: Gpu) -> None:
     mesh, pairs = ear(1000), opposite(ear(1000), 50)
     there, back = (
         form_factors(gpu, mesh, material("marble").profile, p).astype(np.float64) for p in (pairs, pairs[:, ::-1])
@@ -89,8 +88,8 @@ def test_each_gives_the_other_as_much(gpu: Gpu) -> None:
     np.testing.assert_allclose(there * area[pairs[:, :1]], back * area[pairs[:, 1:]], rtol=1e-4)
 
 
-def test_far_apart_a_constant_distance_will_do(gpu: Gpu) -> None:
-    """Where fans count as points, K is within what they may bend of A_i R(|v_i - v_o|), centroids for vertices."""
+def test_distant_form_factors_are_nearly_area_times_reflectance(gpu: Gpu) -> None:
+    """Pairs of order 0: K differs from A_i R_d at the distance of the centroids by no more than the error limit."""
     mesh, profile = ear(4000), material("marble").profile
     factors = FormFactors(gpu, mesh, profile)
     random = np.random.default_rng(0)
@@ -99,13 +98,13 @@ def test_far_apart_a_constant_distance_will_do(gpu: Gpu) -> None:
     assert len(far) == 300
     distance = np.linalg.norm(factors.fans.centre[far[:, 0]] - factors.fans.centre[far[:, 1]], axis=1)
     flat = fan_areas(mesh)[far[:, 1], None] * profile.reflectance(distance)
-    K, finest = factors.of(far), factors._integrated(far, 4)
-    np.testing.assert_allclose(K.sum(axis=1), flat.sum(axis=1), rtol=2.0 * module._BENT[0])
+    K, finest = factors.of(far), factors._integrate(far, 4)
+    np.testing.assert_allclose(K.sum(axis=1), flat.sum(axis=1), rtol=2.0 * module._FLAT_LIMITS[0])
     np.testing.assert_allclose(K.sum(axis=1), finest.sum(axis=1), rtol=0.005)
 
 
-def test_a_point_knows_how_far_what_it_stands_for_extends(gpu: Gpu) -> None:
-    """Straight across, the mean squared distance is all that counts to second order."""
+def test_the_extents_of_points_correct_their_distance(gpu: Gpu) -> None:
+    """For fans straight opposite each other, R_d at the root mean square distance is right to second order."""
     mesh, profile = slab(size=(20.0, 20.0, 4.0), vertices=1200), material("marble").profile
     pairs = opposite(mesh, 60)
     straight = (np.abs(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]])[:, :2] < 1e-3).all(axis=1)
@@ -114,12 +113,12 @@ def test_a_point_knows_how_far_what_it_stands_for_extends(gpu: Gpu) -> None:
     factors = FormFactors(gpu, mesh, profile)
     distance = np.linalg.norm(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]], axis=1)
     flat = (fan_areas(mesh)[pairs[:, 1], None] * profile.reflectance(distance)).sum(axis=1)
-    one, many = (factors._integrated(pairs, order).sum(axis=1) for order in (0, 3))
+    one, many = (factors._integrate(pairs, order).sum(axis=1) for order in (0, 3))
     assert len(pairs) > 10 and (flat / many > 1.02).all()
     np.testing.assert_allclose(one, many, rtol=0.003)
 
 
-def test_coarse_cells_over_a_short_range_want_many_points(gpu: Gpu) -> None:
+def test_large_fans_with_a_short_range_profile_get_points_of_high_order(gpu: Gpu) -> None:
     mesh, profile = slab(size=(40.0, 40.0, 1.0), vertices=100), material("skin1").profile
     pairs = opposite(mesh, 4)
     factors = FormFactors(gpu, mesh, profile)
@@ -129,16 +128,16 @@ def test_coarse_cells_over_a_short_range_want_many_points(gpu: Gpu) -> None:
         assert (np.abs(K - mean) < 0.01 * mean + 4.0 * error).all()
 
 
-def test_a_fan_of_many_faces_is_summed_in_parts(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fans_with_many_points_are_summed_in_parts(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     profile, pairs = material("skin1").profile, opposite(PLATES, 10)
     whole = form_factors(gpu, PLATES, profile, pairs)
-    monkeypatch.setattr(module, "_TURNS", 300)
+    monkeypatch.setattr(module, "_MAX_TURNS", 300)
     np.testing.assert_allclose(form_factors(gpu, PLATES, profile, pairs), whole, rtol=1e-5)
 
 
-def test_vertices_without_a_fan_and_no_pairs_at_all(gpu: Gpu) -> None:
+def test_form_factors_of_vertices_without_faces_are_zero_and_no_pairs_give_none(gpu: Gpu) -> None:
     mesh = Mesh(np.concatenate([PLATES.positions, [[0, 0, 5]]]), PLATES.faces)
     profile, lone = material("skin1").profile, len(PLATES.positions)
-    found = form_factors(gpu, mesh, profile, np.array([[lone, 0], [0, lone], [0, 1]]))
-    assert (found[:2] == 0).all() and (found[2] > 0).all()
+    K = form_factors(gpu, mesh, profile, np.array([[lone, 0], [0, lone], [0, 1]]))
+    assert (K[:2] == 0).all() and (K[2] > 0).all()
     assert form_factors(gpu, mesh, profile, np.zeros((0, 2), int)).shape == (0, 3)

@@ -1,20 +1,20 @@
-"""Who receives anything, against all form factors."""
+"""The map of a mesh that deforms: its receivers and weights, compared with sums over all form factors."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wgsss.bake.sam.fit.select import FAINTEST
 from wgsss.bake.sam.form_factors import form_factors
 from wgsss.bake.sam.full_tree import full_tree
+from wgsss.bake.sam.sender_map import FAINTEST
 from wgsss.scene import MATERIALS, Mesh
 from wgsss.scene.shapes import slab
 
 PROFILE = MATERIALS["wholemilk"].profile
 
 
-def test_a_wedge_is_received_through_where_it_is_thin(gpu):
-    """As nearly as nodes tell that are as large as it is thick."""
+def test_the_thin_part_of_a_wedge_receives_and_the_thick_part_does_not(gpu):
+    """The limit is FAINTEST, within the error of nodes that are as large as the wedge is thick."""
     block = slab((60, 40, 40), 900)
     thickness = 0.02 + 0.98 * (block.positions[:, :1] + 30.0) / 60.0
     mesh = Mesh(block.positions * np.concatenate([np.ones_like(thickness), thickness, thickness], axis=1), block.faces)
@@ -24,11 +24,11 @@ def test_a_wedge_is_received_through_where_it_is_thin(gpu):
     K = form_factors(gpu, mesh, PROFILE, np.stack([receiver, sender], axis=1))
     total = np.stack([np.bincount(receiver, K[:, c], len(x)) for c in range(3)], axis=1)
 
-    found = full_tree(gpu, mesh, PROFILE)
+    sender_map = full_tree(gpu, mesh, PROFILE)
     share = (total / PROFILE.total).max(axis=1)
-    received = (found.sender >= 0).all(axis=1)
-    assert received[share > 1.2 * FAINTEST].all() and not received[share < 0.8 * FAINTEST].any()
-    assert 0.1 < received.mean() < 0.9
-    assert np.all(found.sender[received] == len(x) + len(found.tree.first) - 1), "the root"
-    error = found.weight[:, 0] - total
+    receives = (sender_map.sender >= 0).all(axis=1)
+    assert receives[share > 1.2 * FAINTEST].all() and not receives[share < 0.8 * FAINTEST].any()
+    assert 0.1 < receives.mean() < 0.9
+    assert np.all(sender_map.sender[receives] == len(x) + len(sender_map.tree.first) - 1), "the root is the sender"
+    error = sender_map.weight[:, 0] - total
     assert np.sqrt(np.square(error).sum() / np.square(total).sum()) < 0.06

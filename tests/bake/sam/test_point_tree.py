@@ -1,4 +1,4 @@
-"""The tree over points: who is under whom, and how compact that is."""
+"""The tree over points: its levels, its nodes, and how compact the nodes are."""
 
 from __future__ import annotations
 
@@ -16,51 +16,51 @@ def points() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def made(points) -> PointTree:
+def tree(points) -> PointTree:
     return point_tree(points)
 
 
 @pytest.mark.parametrize("V", [1, 2, 3, 4, 5, 15, 16, 17, 1000])
-def test_levels_cover_all_points(V):
-    made = point_tree(np.random.default_rng(V).random((V, 2)))
-    assert sorted(made.order) == list(range(V))
-    sizes = np.diff(made.levels)
+def test_each_level_covers_all_points_once(V):
+    tree = point_tree(np.random.default_rng(V).random((V, 2)))
+    assert sorted(tree.order) == list(range(V))
+    sizes = np.diff(tree.levels)
     assert sizes[-1] == 1 and np.all(sizes[:-1] == 4 * sizes[1:])
-    for a, b in pairwise(made.levels):
-        first, count = made.first[a:b], made.count[a:b]
+    for a, b in pairwise(tree.levels):
+        first, count = tree.first[a:b], tree.count[a:b]
         assert first[0] == 0 and np.all(first[1:] == (first + count)[:-1]) and (first + count)[-1] == V
-    finest = made.count[: sizes[0]]
+    finest = tree.count[: sizes[0]]
     assert 1 <= finest.min() and finest.max() <= 4
 
 
-def test_a_node_holds_what_its_children_hold(made):
-    for level in range(1, len(made.levels) - 1):
-        for k in range(made.levels[level + 1] - made.levels[level]):
-            children = made.levels[level - 1] + 4 * k + np.arange(4)
-            node = made.levels[level] + k
-            assert made.first[node] == made.first[children[0]]
-            assert made.count[node] == made.count[children].sum()
+def test_a_node_covers_the_points_of_its_children(tree):
+    for level in range(1, len(tree.levels) - 1):
+        for k in range(tree.levels[level + 1] - tree.levels[level]):
+            children = tree.levels[level - 1] + 4 * k + np.arange(4)
+            node = tree.levels[level] + k
+            assert tree.first[node] == tree.first[children[0]]
+            assert tree.count[node] == tree.count[children].sum()
 
 
-def test_sums(made, points):
-    found = made.sums(points)
-    for node in (0, 57, len(made.first) - 1):
-        under = made.order[made.first[node] : made.first[node] + made.count[node]]
-        np.testing.assert_allclose(found[node], points[under].sum(axis=0))
+def test_sums_are_over_the_points_of_each_node(tree, points):
+    sums = tree.sums(points)
+    for node in (0, 57, len(tree.first) - 1):
+        under = tree.order[tree.first[node] : tree.first[node] + tree.count[node]]
+        np.testing.assert_allclose(sums[node], points[under].sum(axis=0))
 
 
-def test_nodes_are_compact(made, points):
-    """A quarter of a 4 x 2 x 1 box is a cube with an edge of 2 at most; without an order it would be the whole box."""
-    quarters = range(made.levels[-3], made.levels[-2])
+def test_nodes_are_compact(tree, points):
+    """Four nodes of a 4 x 2 x 1 box fit in cubes with an edge of about 2; random quarters would fill the whole box."""
+    quarters = range(tree.levels[-3], tree.levels[-2])
     for node in quarters:
-        under = points[made.order[made.first[node] : made.first[node] + made.count[node]]]
+        under = points[tree.order[tree.first[node] : tree.first[node] + tree.count[node]]]
         assert np.ptp(under, axis=0).max() < 2.2
 
 
-def test_what_faces_another_way_is_elsewhere():
-    """The two sides of a sheet, when normals count for more than its thickness."""
+def test_scaled_normals_separate_the_two_sides_of_a_sheet():
+    """The third coordinate is a normal, scaled to be larger than the extent of the sheet."""
     x = np.random.default_rng(1).random((400, 2))
     side = np.repeat([-1.0, 1.0], 200)
-    made = point_tree(np.column_stack([x, 3.0 * side]))
-    halves = np.split(side[made.order], 2)
+    tree = point_tree(np.column_stack([x, 3.0 * side]))
+    halves = np.split(side[tree.order], 2)
     assert all(np.ptp(half) == 0.0 for half in halves)

@@ -1,4 +1,8 @@
-"""Spatial Adjacency Maps (Maisch & Ropinski 2017): what each vertex receives through the object, from a few senders."""
+"""Spatial Adjacency Maps (Maisch & Ropinski 2017): for each vertex, the senders that contribute to its M_back.
+
+The selections choose a few senders for each vertex: `top` and `coarse` as the paper describes (published/), `fit` by a
+least-squares fit (fit/). Meshes that deform can have a tree over all vertices instead (full_tree). All maps are cached.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +20,9 @@ from wgsss.bake.sam.fit.candidates import candidates
 from wgsss.bake.sam.fit.neighbour_mixture import neighbour_mixture
 from wgsss.bake.sam.fit.omp import omp
 from wgsss.bake.sam.fit.refit import refit
-from wgsss.bake.sam.fit.select import SECOND, select_fit
+from wgsss.bake.sam.fit.select import RECEIVERS_PER_SECOND_ROW, select_fit
 from wgsss.bake.sam.fit.smoothed_means import smoothed_means
-from wgsss.bake.sam.fit.training import training
+from wgsss.bake.sam.fit.training import training_lights
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.full_tree import full_tree
 from wgsss.bake.sam.mesh_checks import topology_warning
@@ -43,11 +47,11 @@ SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], SenderMap]] = {
     "coarse": select_coarse,
     "fit": select_fit,
 }
-"""Ways to choose the senders, by name."""
+"""The functions that choose the senders and weights, by the name of the selection."""
 
-MOST_BYTES = 1 << 30
-"""of the entries of a map"""
-_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
+MAX_BYTES = 1 << 30
+"""largest size of a map"""
+_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: distances at which R_d is part of the cache key
 _TOP = (
     SenderMap,
     fan_areas,
@@ -82,51 +86,59 @@ _CODE: dict[str, tuple[Any, ...]] = {
         batched_nnls,
         omp,
         refit,
-        training,
+        training_lights,
         Caster,
         "sam/blends",
         "sam/mix",
     ),
     "full_tree": (*_PATCHES, select_fit),
 }
-"""What each depends on, beside the module that it is in."""
+"""Functions and classes whose modules, and WGSL modules, on which each kind of map depends."""
 
 
-def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, samples: int, select: str) -> SenderMap:
-    """The map of a mesh with `samples` entries for each vertex, chosen as `select` says; cached.
+def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, entries_per_vertex: int, select: str) -> SenderMap:
+    """Return the map of a mesh, from the cache if it is there, by one of SELECTIONS.
 
-    Warns of what makes front and back sides (000 eq. 13, 14) mean less than they should: see `topology_warning`.
+    Warns of flaws of the mesh that make the split into front and back sides unreliable (see `topology_warning`).
 
-    Raises InputError for a selection that is not there, fewer than one sample, and a map of more than MOST_BYTES.
+    Raises InputError for an unknown selection, fewer than one entry per vertex, and a map of more than MAX_BYTES.
     """
     if select not in SELECTIONS:
         raise unknown("selection", select, SELECTIONS)
-    if samples < 1:
-        raise InputError(f"{mesh.name}: a spatial adjacency map needs at least one sample, not {samples}")
-    V, is_fit = len(mesh.positions), select == "fit"
-    size = ENTRY_BYTES * samples * (V + -(-V // SECOND) * is_fit) + MIXTURE_BYTES * V * is_fit
-    if size > MOST_BYTES:
+    if entries_per_vertex < 1:
         raise InputError(
-            f"{mesh.name}: {samples} samples for each of {V} vertices take {size} bytes, "
-            f"and a spatial adjacency map may have {MOST_BYTES}"
+            f"{mesh.name}: samples, the number of entries per vertex, must be at least 1, not {entries_per_vertex}"
         )
-    return _cached(select, SELECTIONS[select], gpu, mesh, profile, samples)
+    V, is_fit = len(mesh.positions), select == "fit"
+    rows = V + -(-V // RECEIVERS_PER_SECOND_ROW) * is_fit
+    size = ENTRY_BYTES * entries_per_vertex * rows + MIXTURE_BYTES * V * is_fit
+    if size > MAX_BYTES:
+        raise InputError(
+            f"{mesh.name}: {entries_per_vertex} entries for each of {V} vertices take {size} bytes, "
+            f"but a spatial adjacency map may have at most {MAX_BYTES}"
+        )
+    return _cached(select, SELECTIONS[select], gpu, mesh, profile, entries_per_vertex)
 
 
 def full_sender_tree(gpu: Gpu, mesh: Mesh, profile: Profile) -> SenderMap:
-    """A tree over all vertices of a mesh, and who receives anything from behind; cached. Warns as above."""
+    """Return the map of a mesh that deforms, from the cache if it is there (see `full_tree`). Warns as above."""
     return _cached("full_tree", full_tree, gpu, mesh, profile)
 
 
 def _cached(
-    name: str, choose: Callable[..., SenderMap], gpu: Gpu, mesh: Mesh, profile: Profile, *samples: int
+    name: str, choose: Callable[..., SenderMap], gpu: Gpu, mesh: Mesh, profile: Profile, *count: int
 ) -> SenderMap:
+    """Return the map of `choose(gpu, mesh, profile, *count)` from the cache, and warn of flaws of the mesh.
+
+    The warning is stored with the map, so that a cached map warns as well.
+    """
+
     def make() -> Arrays:
         note = topology_warning(mesh)
-        return {**choose(gpu, mesh, profile, *samples).arrays(), "note": np.array(note)}
+        return {**choose(gpu, mesh, profile, *count).arrays(), "note": np.array(note)}
 
-    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), *samples]
-    found = cached("sam", [*key, name, gpu.name], make, code=(choose, topology_warning, *_CODE[name]))
-    if note := str(found["note"]):
+    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), *count]
+    arrays = cached("sam", [*key, name, gpu.name], make, code=(choose, topology_warning, *_CODE[name]))
+    if note := str(arrays["note"]):
         warnings.warn(f"{mesh.name}: {note}", Note, stacklevel=3)
-    return SenderMap.from_arrays(found)
+    return SenderMap.from_arrays(arrays)

@@ -1,4 +1,9 @@
-"""Form factors between reduced triangle fans (000 eq. 11), integrated over both on the GPU."""
+"""Form factors between reduced triangle fans, integrated numerically on the GPU (Maisch & Ropinski 2017, eq. 11).
+
+The form factor K_oi is what sender i contributes to M at receiver o per unit of irradiance L_d at i. It is a double
+integral of R_d over the fans of both. Each fan is replaced by quadrature points, more of them where R_d varies more
+over the two fans. A distant pair then costs one evaluation of R_d, and a near one hundreds.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.sam.fan_quadrature import Fans, Points
+from wgsss.bake.sam.fan_quadrature import FanPoints, Fans
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
@@ -19,52 +24,55 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 _MODULE = "sam/form_factors"
-# Shares of K by which it may be off, to second order, where fans count as one point each, and where each quad does.
-_BENT = (0.004, 0.012)
-# Otherwise Gauss' points of order 2, 3 and so on, by how large the fans are against what R bends over where they come
-# nearest to each other, squared. Measured, so that K is off by half a percent at most, and by 2 % beyond the last.
-_NEAREST = (2.0, 4.0, 14.0, 20.0, 60.0, 120.0)
-_WIDTH = 1.5  # of a fan to either side, in roots of its mean squared extent
-MOST = len(_BENT) + len(_NEAREST)
-"""the highest order of points in a quad"""
-_DARK = 0.01  # of the brightest channel's R: what a channel that is darker is off by matters less
-_TURNS = 60_000  # of a shader's loops: lavapipe ends them after 65,535, those of nested ones together
-_POINTS = 1_000_000  # on the device at once
-_SUBMISSION = 0.4  # seconds that a dispatch may take
-_FIRST_RATE = 1e7  # pairs of points per second that any device manages
+_FLAT_LIMITS = (0.004, 0.012)
+"""largest estimated relative error of K, to second order, for points of order 0 and of order 1"""
+_GAUSS_LIMITS = (2.0, 4.0, 14.0, 20.0, 60.0, 120.0)
+"""for Gauss points of order 2, 3, ...: largest product of the fans' extents and the relative curvature of R_d where the
+fans come nearest to each other. Measured: K is then off by half a percent at most, and by 2 % beyond the last limit"""
+_HALF_WIDTH = 1.5  # of a fan, in square roots of its extent
+MAX_ORDER = len(_FLAT_LIMITS) + len(_GAUSS_LIMITS)
+"""the highest order of quadrature points that is used"""
+_DARK = 0.01  # of the brightest channel's R_d: the error of a channel that is darker than this counts less
+_MAX_TURNS = 60_000  # of a shader's loops: lavapipe ends them after 65,535, counting nested loops together
+_MAX_POINTS = 1_000_000  # on the device at once
+_DISPATCH_SECONDS = 0.4  # that one dispatch should take
+_FIRST_RATE = 1e7  # pairs of points per second, which any device manages: replaced by the measured rate
 
 
 @dataclass(frozen=True, eq=False)
 class Reflectance:
-    """R_d over the squared distance, by its leading bits as a float32."""
+    """A table of R_d over the squared distance, whose rows are addressed by the leading bits of a float32."""
 
     R: Array
-    """float32 (k, 4), 1/mm^2"""
+    """float32 (k, 4), 1/mm^2; the last column is 0"""
     first: int
-    """the leading bits of the first row"""
+    """the leading bits of the squared distance of the first row"""
     bend: Array
-    """float64 (k,): by how much of itself R differs from a straight line over a change of the squared distance as large
-    as itself, to second order: q^2 |d^2R/dq^2| / R with q = r^2, of the channel where it is most"""
+    """float64 (k,): relative curvature of R_d, q^2 |d^2R/dq^2| / R with q = r^2, of the channel where it is largest. It
+    is the second-order error of taking R_d for linear over a change of q that is as large as q"""
 
     @property
     def squares(self) -> Array:
-        """float64 (k,), mm^2: the squared distances."""
+        """The squared distances of the rows, float64 (k,), mm^2."""
         return squares(self.first, self.first + len(self.R))
 
 
 def squares(first: int, end: int) -> Array:
-    """The squared distances (end - first,), mm^2, whose leading bits count up from `first`."""
+    """Return the squared distances (end - first,), mm^2, whose leading bits count up from `first`."""
     bits = np.arange(first, end, dtype=np.uint32) << np.uint32(shift())
     return bits.view(np.float32).astype(np.float64)
 
 
 def shift() -> int:
-    """Bits of a squared distance that tables leave out."""
+    """Return how many trailing bits of a float32 squared distance the tables ignore, as the shader has it."""
     return wgsl.load(_MODULE).constants["SHIFT"]
 
 
 def reflectance(profile: Profile, farthest: float) -> Reflectance:
-    """R_d up to `farthest` mm. Nearer than a thousandth of what half of the light travels it is level."""
+    """Tabulate R_d up to a distance of `farthest` mm.
+
+    The table starts at a thousandth of the radius within which half of the light leaves; R_d is constant below that.
+    """
     lit = profile.total > 0.0
     nearest = 1e-3 * float(profile.range(0.5)[lit].min()) if lit.any() else 1.0
     first, last = (int(np.float32(r * r).view(np.uint32)) >> shift() for r in (nearest, max(farthest, 2.0 * nearest)))
@@ -78,16 +86,19 @@ def reflectance(profile: Profile, farthest: float) -> Reflectance:
 
 
 def form_factors(gpu: Gpu, mesh: Mesh, profile: Profile, pairs: Array) -> Array:
-    """K_oi (P, 3), float32, of pairs (P, 2) of vertices o and i: without unit.
+    """Return the form factors K_oi of pairs of vertices, float32 (P, 3), without unit.
 
-    The mean over the fan of o of the integral over the fan of i of R_d(|x_i - x_o|). By Gauss' points, as many as
-    the profile bends over the fans; far apart, each counts as one. 0 for vertices without a fan.
+    K_oi is the mean over the fan of o of the integral of R_d(|x_i - x_o|) over the fan of i (eq. 11). It is 0 where a
+    vertex has no faces. The sides of the pair (eq. 13, 14) are not tested.
+
+    Args:
+        pairs: int (P, 2), receiver o and sender i.
     """
     return FormFactors(gpu, mesh, profile).of(pairs)
 
 
 class FormFactors:
-    """The form factors of one mesh and profile, a few at a time."""
+    """Integrates form factors of one mesh and profile, for lists of pairs."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
         self.gpu, self.fans = gpu, Fans(mesh)
@@ -95,83 +106,89 @@ class FormFactors:
         self.table = gpu.buffer(self.R.R)
         self.rate = _FIRST_RATE
 
-    def of(self, pairs: Array, most: int = MOST) -> Array:
-        """As `form_factors`, by points of the order `most` at most."""
+    def of(self, pairs: Array, max_order: int = MAX_ORDER) -> Array:
+        """Return K_oi of pairs (P, 2), float32 (P, 3), with quadrature points of at most the order `max_order`."""
         pairs = np.asarray(pairs, np.int64).reshape(-1, 2)
         K = np.zeros((len(pairs), 3))
-        both = (self.fans.area[pairs] > 0.0).all(axis=1)
-        orders = np.where(both, np.minimum(self._orders(pairs), most), -1)
-        for order in np.unique(orders[both]):
+        has_area = (self.fans.area[pairs] > 0.0).all(axis=1)
+        orders = np.where(has_area, np.minimum(self._orders(pairs), max_order), -1)
+        for order in np.unique(orders[has_area]):
             chosen = np.flatnonzero(orders == order)
-            K[chosen] = self._integrated(pairs[chosen], int(order))
+            K[chosen] = self._integrate(pairs[chosen], int(order))
         return K.astype(np.float32)
 
     def _orders(self, pairs: Array) -> Array:
-        """Of which order (P,) the points for each pair are, so that they tell how R bends over both fans."""
+        """Choose the order (P,) of the quadrature points for each pair, from how much R_d varies over both fans."""
         fans, (o, i) = self.fans, pairs.T
         d = fans.centre[i] - fans.centre[o]
         square = np.maximum(np.einsum("pk,pk->p", d, d), 1e-30)
         extent = fans.extent[o] + fans.extent[i]
         across = [np.square(np.einsum("pk,pk->p", d, fans.normal[v])) for v in (o, i)]
-        # What moves along d changes the distance, and in a fan nothing moves along its normal.
+        # Only the extent along d changes the distance to first order. A fan is flat: it has none along its normal.
         along = sum(fans.extent[v] * np.maximum(1.0 - a / square, 0.25) for v, a in zip((o, i), across, strict=True))
-        bent = self._bend(square + extent) * along
-        # Where the fans come nearest to each other, about which their normals and sizes say what is needed.
+        flat_error = self._curvature(square + extent) * along
+        # The least distance between the fans, estimated from their normals and widths.
         apart = np.minimum(*across)
-        aside = np.maximum(np.sqrt(np.maximum(square - apart, 0.0)) - _WIDTH * np.sqrt(extent), 0.0)
-        nearest = self._bend(apart + np.square(aside)) * extent
-        few = np.searchsorted(_BENT, bent, side="right")
-        return np.where(few < len(_BENT), few, len(_BENT) + np.searchsorted(_NEAREST, nearest, side="right"))
+        aside = np.maximum(np.sqrt(np.maximum(square - apart, 0.0)) - _HALF_WIDTH * np.sqrt(extent), 0.0)
+        variation = self._curvature(apart + np.square(aside)) * extent
+        flat_order = np.searchsorted(_FLAT_LIMITS, flat_error, side="right")
+        gauss_order = len(_FLAT_LIMITS) + np.searchsorted(_GAUSS_LIMITS, variation, side="right")
+        return np.where(flat_order < len(_FLAT_LIMITS), flat_order, gauss_order)
 
-    def _bend(self, q: Array) -> Array:
-        """1/mm^2, (P,): by how much of itself R bends at squared distances, per square of what moves."""
+    def _curvature(self, q: Array) -> Array:
+        """Return the relative curvature of R_d at squared distances `q` (P,), mm^2, per mm^2 of squared movement."""
         q = np.maximum(q, self.R.squares[0])
-        found: Array = np.interp(q, self.R.squares, self.R.bend) / q
-        return found
+        curvature: Array = np.interp(q, self.R.squares, self.R.bend) / q
+        return curvature
 
-    def _integrated(self, pairs: Array, order: int) -> Array:
-        """K (P, 3) by points of one order."""
-        count = self.fans.count(order)
-        # Alike for all, since invocations that walk in step take as many turns as the longest loops of any.
-        step = max(_TURNS // int(count.max() + 1), 1)
+    def _integrate(self, pairs: Array, order: int) -> Array:
+        """Return K (P, 3) by points of one order, in dispatches of about `_DISPATCH_SECONDS`."""
+        count = self.fans.point_counts(order)
+        # Receivers with many points are split into parts. All parts are equally long, since invocations that run in
+        # step take as many turns as the longest loop among them.
+        step = max(_MAX_TURNS // int(count.max() + 1), 1)
         work = count[pairs[:, 0]] * count[pairs[:, 1]]
         K = np.zeros((len(pairs), 3))
         first = 0
         while first < len(pairs):
-            ahead = slice(first, first + max(int(self.rate * _SUBMISSION), 1))
-            within = np.cumsum(work[ahead]) <= self.rate * _SUBMISSION
-            within &= np.cumsum(count[pairs[ahead]].sum(axis=1)) <= _POINTS
-            some = slice(first, first + max(int(within.sum()), 1))
-            K[some] = self._dispatch(pairs[some], self.fans.points(np.unique(pairs[some]), order), step)
-            first = some.stop
+            ahead = slice(first, first + max(int(self.rate * _DISPATCH_SECONDS), 1))
+            within = np.cumsum(work[ahead]) <= self.rate * _DISPATCH_SECONDS
+            within &= np.cumsum(count[pairs[ahead]].sum(axis=1)) <= _MAX_POINTS
+            batch = slice(first, first + max(int(within.sum()), 1))
+            K[batch] = self._dispatch(pairs[batch], self.fans.points(np.unique(pairs[batch]), order), step)
+            first = batch.stop
         return K / self.fans.area[pairs[:, :1]]
 
-    def _dispatch(self, pairs: Array, points: Points, step: int) -> Array:
+    def _dispatch(self, pairs: Array, points: FanPoints, step: int) -> Array:
+        """Return the integral of R_d over both fans of each pair, float64 (P, 3), mm^2.
+
+        Each invocation sums over at most `step` points of the receiver and all points of the sender.
+        """
         start = time.perf_counter()
-        at = np.searchsorted(points.vertex, pairs)
-        (o, i), (o_end, i_end) = points.start[at].T, points.start[at + 1].T
+        row = np.searchsorted(points.vertex, pairs)
+        (o, i), (o_end, i_end) = points.start[row].T, points.start[row + 1].T
         count = -(-(o_end - o) // step)
-        which = np.repeat(np.arange(len(pairs)), count)
+        pair = np.repeat(np.arange(len(pairs)), count)
         starts = np.cumsum(count) - count
-        o_first = o[which] + (np.arange(len(which)) - starts[which]) * step
+        o_first = o[pair] + (np.arange(len(pair)) - starts[pair]) * step
         terms = {
             "o_first": o_first,
-            "o_end": np.minimum(o_first + step, o_end[which]),
-            "i_first": i[which],
-            "i_end": i_end[which],
+            "o_end": np.minimum(o_first + step, o_end[pair]),
+            "i_first": i[pair],
+            "i_end": i_end[pair],
         }
         graph = Graph(self.gpu)
         sums = graph.dispatch(
             _MODULE,
-            size=len(which),
+            size=len(pair),
             params={"first_entry": self.R.first},
             table=self.table,
             points={"position": points.position, "area": points.area, "extent": points.extent},
             terms=terms,
         )
         graph.run(sums)
-        found = np.add.reduceat(graph.read(sums)[:, :3].astype(np.float64), starts, axis=0)
+        integrals = np.add.reduceat(graph.read(sums)[:, :3].astype(np.float64), starts, axis=0)
         done = float(((o_end - o) * (i_end - i)).sum())
         rate = done / (time.perf_counter() - start)
         self.rate = float(np.clip(rate, self.rate / 2, self.rate * 4)) if done > 1e5 else self.rate
-        return found
+        return integrals

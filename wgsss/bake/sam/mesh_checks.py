@@ -1,4 +1,8 @@
-"""What the split into front and back sides means for meshes that are not one closed surface (000 §3.3)."""
+"""Checks of a mesh for which the split into a front and a back side is unreliable.
+
+The split (Maisch & Ropinski 2017, section 3.3, eq. 13, 14) looks at positions and normals only. It is meaningful where
+the mesh is one closed surface whose normals point outwards.
+"""
 
 from __future__ import annotations
 
@@ -13,39 +17,46 @@ Array = npt.NDArray[Any]
 
 
 def topology_warning(mesh: Mesh) -> str:
-    """One line on what is open, non-manifold, inverted or in parts, and what comes of it; empty if nothing is."""
+    """Return one line that names the flaws of a mesh and what each does to M_back; empty where there are none.
+
+    The flaws are open edges, edges between faces of inconsistent winding or of more than two faces, inverted normals of
+    a closed mesh, and several connected components.
+    """
     start, end = mesh.faces.ravel().astype(np.int64), np.roll(mesh.faces, -1, axis=1).ravel().astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)
-    edges, each, count = np.unique(low * len(mesh.positions) + high, return_inverse=True, return_counts=True)
-    forward = np.bincount(each, start < end, len(edges))
+    edges, edge, count = np.unique(low * len(mesh.positions) + high, return_inverse=True, return_counts=True)
+    forward = np.bincount(edge, start < end, len(edges))
     notes = []
     if open_edges := int((count == 1).sum()):
-        notes.append(f"{_counted(open_edges, 'open edge')}: where there is no surface, nothing arrives")
-    crossing = int((count > 2).sum())
-    if crossing := crossing + int(((count == 2) & (forward != 1)).sum()):
-        notes.append(f"{_counted(crossing, 'edge')} not between two faces that agree: normals there may point inwards")
+        notes.append(f"{_counted(open_edges, 'open edge')}: no light enters through the holes")
+    inconsistent = int((count > 2).sum()) + int(((count == 2) & (forward != 1)).sum())
+    if inconsistent:
+        edge_count = _counted(inconsistent, "edge")
+        notes.append(f"{edge_count} without exactly two faces of the same winding: some normals may point inwards")
     if not open_edges and _volume(mesh) < 0.0:
-        notes.append("wound inwards: what is outside counts as the back side")
-    if (parts := _parts(mesh, low, high)) > 1:
-        notes.append(f"{parts} parts: light passes from one to another as if the gaps between them were filled")
+        notes.append("the normals point inwards: the outside of the object counts as its back side")
+    if (components := _component_count(mesh)) > 1:
+        notes.append(f"{components} separate components: light passes between them as if the gaps were filled")
     return "; ".join(notes)
 
 
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'s' if count > 1 else ''}"
+def _counted(count: int, noun: str) -> str:
+    """Return the count and the noun, in the plural for more than one."""
+    return f"{count} {noun}{'s' if count > 1 else ''}"
 
 
 def _volume(mesh: Mesh) -> float:
-    """mm^3"""
+    """Return the signed volume that a closed mesh encloses, mm^3: negative where the faces are wound inwards."""
     corner = mesh.positions[mesh.faces[:, 0]].astype(np.float64) - mesh.bounds.mean(axis=0)
     return float(np.einsum("ij,ij->", corner, mesh.face_normals) / 6.0)
 
 
-def _parts(mesh: Mesh, start: Array, end: Array) -> int:
-    """Connected parts, of those vertices that have faces."""
+def _component_count(mesh: Mesh) -> int:
+    """Return the number of connected components of the mesh, without vertices that have no faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     count = len(mesh.positions)
     graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(count, count))
     return len(np.unique(connected_components(graph, directed=False)[1][mesh.faces[:, 0]]))

@@ -1,5 +1,10 @@
-"""Form factors of all that reaches patches of vertices: between near fans integrated over both, beyond that R_d at
-their distance."""
+"""Form factors from many senders to small patches of receivers, from a table of R_d.
+
+Between two near vertices, the form factor (Maisch & Ropinski 2017, eq. 11) is integrated over both fans; `near_pairs`
+lists these pairs. For all other pairs, and for all nodes of the sender tree, it is the sender's area times R_d at the
+distance of the centroids (as in eq. 15). The work is laid out as matrix products over patches, because all vertices of
+a mesh and thousands of senders of each are evaluated.
+"""
 
 from __future__ import annotations
 
@@ -17,111 +22,124 @@ from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
-NEAR = 4.0
-"""roots of a fan's area within which form factors are integrated; a fan is some 1.2 across"""
-ORDER = 2
-"""of the points in a quad that they are integrated by"""
-BEYOND = 5e-4
-"""share of the light of a plane that comes from farther away than what is looked at"""
-TAIL = 1e-5
-"""share of it that comes from farther away than what is known at all"""
-FAINT = 2e-3
-"""share of what leaves a plane in all, below which a node is not looked into"""
-NEAREST = 3.0
-"""roots of a fan's area within which quads have points of ORDER; farther away, one that knows how far they extend"""
-_AT_ONCE = 1 << 16  # vertices whose neighbours are found at a time
-_SHIFT = 16  # bits of a squared distance that the table of R_d leaves out: it has 128 entries each time that it doubles
-_LEAST = 1e-3  # its first distance, of what is looked at
+NEAR_WIDTHS = 4.0
+"""distance up to which form factors are integrated, in roots of the larger fan's area; a fan is about 1.2 wide"""
+NEAR_ORDER = 2
+"""highest order of the quadrature points of near pairs"""
+_GAUSS_WIDTHS = 3.0  # the distance, in the same unit, beyond which near pairs have points of order 1 at most
+IGNORED_SHARE = 5e-4
+"""share of the light that leaves a plane beyond the distance at which senders are ignored"""
+_TABLE_SHARE = 1e-5  # share of it that leaves beyond the end of the table, where R_d counts as 0
+_OPENED_SHARE = 2e-3  # of the total of R_d: nodes that contribute more may be replaced by their children
+_SHIFT = 16  # trailing bits of a float32 squared distance that the table ignores: 128 entries for each doubling
+_FIRST_DISTANCE = 1e-3  # of the table, as a share of the distance at which senders are ignored
+_AT_ONCE = 1 << 16  # vertices whose neighbours are searched for together
 
 
 class PatchFormFactors:
-    """K (000 eq. 11) of one mesh and profile, from senders to patches of vertices."""
+    """Form factors K_oi of one mesh, its tree of senders and a profile."""
 
-    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
-        self.farthest = float(profile.range(BEYOND).max())
-        self.faint = FAINT * float(profile.total.max())
-        known = np.array([_LEAST * self.farthest, profile.range(TAIL).max()], np.float32)
-        ends = np.square(known).view(np.int32) >> _SHIFT
+    def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile, senders: SenderTree) -> None:
+        self.senders = senders
+        self.farthest = float(profile.range(IGNORED_SHARE).max())
+        """mm: senders that are farther away are ignored"""
+        self.opened = _OPENED_SHARE * float(profile.total.max())
+        """nodes that contribute more than this, without unit, may be replaced by their children"""
+        ends_mm = np.array([_FIRST_DISTANCE * self.farthest, profile.range(_TABLE_SHARE).max()], np.float32)
+        ends = np.square(ends_mm).view(np.int32) >> _SHIFT
         self._first, last = int(ends[0]), int(ends[1])
         middles = (np.arange(self._first, last + 1, dtype=np.int32) << _SHIFT) + (1 << (_SHIFT - 1))
         R = profile.reflectance(np.sqrt(middles.view(np.float32).astype(np.float64))).astype(np.float32)
-        self._R = np.append(R.T, np.zeros((3, 1), np.float32), axis=1)  # nothing from beyond
+        self._R = np.append(R.T, np.zeros((3, 1), np.float32), axis=1)  # 0 beyond the end
 
         pairs = near_pairs(mesh)
         factors = FormFactors(gpu, mesh, profile)
-        apart = np.linalg.norm(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]], axis=1)
+        distance = np.linalg.norm(mesh.positions[pairs[:, 0]] - mesh.positions[pairs[:, 1]], axis=1)
         width = np.sqrt(factors.fans.area[pairs].max(axis=1))
-        nearest = apart < NEAREST * width
+        is_nearest = distance < _GAUSS_WIDTHS * width
         self._near = np.zeros((len(pairs), 3), np.float32)
-        for which, order in ((nearest, ORDER), (~nearest, 1)):
-            self._near[which] = factors.of(pairs[which], most=order)
+        for chosen, order in ((is_nearest, NEAR_ORDER), (~is_nearest, 1)):
+            self._near[chosen] = factors.of(pairs[chosen], max_order=order)
         self._vertices = len(mesh.positions)
         self._pairs = np.append(pairs[:, 0] * self._vertices + pairs[:, 1], np.iinfo(np.int64).max)
 
     def reflectance(self, squared: Array) -> Array:
-        """R_d, 1/mm^2, (3, ...), at the roots of `squared` (...) mm^2, float32."""
+        """Return R_d (3, ...), 1/mm^2, from the table at squared distances `squared` (...), float32, mm^2."""
         return self._R.take(np.clip(self._entry(squared), 0, self._R.shape[1] - 1), axis=1)
 
-    def __call__(self, s: SenderTree, vertices: Array, senders: Array) -> Array:
-        """float32 (B, 3, P, C): from senders (B, C) to vertices (B, P), 0 where they are not behind them (eq. 13, 14),
-        and of those that are -1."""
-        first = s.x[vertices[:, :1]]  # near them, products lose nothing
+    def __call__(self, receiver: Array, sender: Array) -> Array:
+        """Return the form factors from all senders of a patch to all its receivers, float32 (B, 3, P, C).
 
-        def near(x: Array, which: Array) -> Array:
-            return x[which] - first
+        They are 0 where the sender is not on the back side of the receiver (eq. 13, 14) and where it is -1.
 
-        def product(a: Array, b: Array) -> Array:
+        Args:
+            receiver: int (B, P), the vertices of B patches.
+            sender: int (B, C), vertices and nodes of the tree of senders for each patch; -1 for none.
+        """
+        s = self.senders
+        origin = s.x[receiver[:, :1]]  # products of coordinates lose no digits near it
+
+        def local(x: Array, index: Array) -> Array:
+            return x[index] - origin
+
+        def products(a: Array, b: Array) -> Array:
             return a @ b.transpose(0, 2, 1)
 
-        def own(a: Array, b: Array) -> Array:
+        def dot(a: Array, b: Array) -> Array:
             return np.einsum("bnd,bnd->bn", a, b)
 
-        n, centre, far = s.n[vertices], near(s.centre, vertices), near(s.centre, senders)
-        back = product(n, near(s.x, senders)) < own(n, near(s.x, vertices))[:, :, None]
-        back &= product(n, s.n[senders]) < 0.0
-        square = product(-2.0 * centre, far)
-        square += own(centre, centre)[:, :, None]
-        square += own(far, far)[:, None]
-        area = np.where(senders >= 0, s.area[senders], np.float32(0.0))[:, None]
-        K = np.empty((len(back), 3, *back.shape[1:]), np.float32)
-        entry, counted = self._entry(square), area * back
+        n, centre, far = s.n[receiver], local(s.centre, receiver), local(s.centre, sender)
+        is_behind = products(n, local(s.x, sender)) < dot(n, local(s.x, receiver))[:, :, None]
+        is_behind &= products(n, s.n[sender]) < 0.0
+        square = products(-2.0 * centre, far)
+        square += dot(centre, centre)[:, :, None]
+        square += dot(far, far)[:, None]
+        area = np.where(sender >= 0, s.area[sender], np.float32(0.0))[:, None]
+        K = np.empty((len(is_behind), 3, *is_behind.shape[1:]), np.float32)
+        entry, area_behind = self._entry(square), area * is_behind
         for channel, R in enumerate(self._R):
-            np.multiply(R.take(entry, mode="clip"), counted, out=K[:, channel])
+            np.multiply(R.take(entry, mode="clip"), area_behind, out=K[:, channel])
 
-        width = np.maximum(s.area[vertices][:, :, None], area)
-        back &= (square < 2.0 * NEAR**2 * width) & (senders < self._vertices)[:, None]  # those that may be among pairs
-        b, p, c = np.nonzero(back)
-        pair = vertices[b, p] * np.int64(self._vertices) + senders[b, c]
-        at = np.searchsorted(self._pairs, pair)
-        known = self._pairs[at] == pair
-        K[b[known], :, p[known], c[known]] = self._near[at[known]]
+        # Integrated form factors replace those of near pairs. First drop what is too far away to be one.
+        width = np.maximum(s.area[receiver][:, :, None], area)
+        is_behind &= (square < 2.0 * NEAR_WIDTHS**2 * width) & (sender < self._vertices)[:, None]
+        b, p, c = np.nonzero(is_behind)
+        pair = receiver[b, p] * np.int64(self._vertices) + sender[b, c]
+        index = np.searchsorted(self._pairs, pair)
+        is_near = self._pairs[index] == pair
+        K[b[is_near], :, p[is_near], c[is_near]] = self._near[index[is_near]]
         return K
 
     def _entry(self, square: Array) -> Array:
+        """Return the entries of the table, unclamped, for squared distances, float32, mm^2."""
         return (square.view(np.int32) >> np.int32(_SHIFT)) - np.int32(self._first)
 
 
 def near_pairs(mesh: Mesh) -> Array:
-    """int64 (P, 2): vertices o and i, on the back side of o, whose distance is NEAR roots of the larger fan's area at
-    most; in ascending order."""
+    """Return the pairs of near vertices, int64 (P, 2), in ascending order: receiver o and sender i behind it.
+
+    A pair is near if its distance is at most NEAR_WIDTHS square roots of the larger of the two fans' areas. The sender
+    is on the back side of the receiver (eq. 13, 14).
+    """
     from scipy.spatial import KDTree
 
     x, n, V = mesh.positions.astype(np.float64), mesh.normals, len(mesh.positions)
-    reach = NEAR * np.sqrt(fan_areas(mesh))
-    everything = KDTree(x)
-    found = []
-    order = np.argsort(reach, kind="stable")  # of those of one search, which has one radius, few have a smaller one
-    for some in np.split(order, _cuts(reach[order])):
-        pairs = KDTree(x[some]).sparse_distance_matrix(everything, reach[some[-1]], output_type="ndarray")
-        o, i = some[pairs["i"]], pairs["j"]
-        kept = (pairs["v"] <= reach[o]) & (np.einsum("pd,pd->p", n[o], n[i]) < 0.0)
-        found += [o[kept] * V + i[kept], i[kept] * V + o[kept]]
-    o, i = np.divmod(np.unique(np.concatenate(found)), V)
-    below = np.einsum("pd,pd->p", x[i] - x[o], n[o]) < 0.0
-    return np.stack([o, i], axis=1)[below]
+    reach = NEAR_WIDTHS * np.sqrt(fan_areas(mesh))
+    all_vertices = KDTree(x)
+    keys = []
+    order = np.argsort(reach, kind="stable")
+    # One search has one radius, the largest reach of its vertices, so vertices of similar reach share a search.
+    for batch in np.split(order, _cuts(reach[order])):
+        pairs = KDTree(x[batch]).sparse_distance_matrix(all_vertices, reach[batch[-1]], output_type="ndarray")
+        o, i = batch[pairs["i"]], pairs["j"]
+        is_near = (pairs["v"] <= reach[o]) & (np.einsum("pd,pd->p", n[o], n[i]) < 0.0)
+        keys += [o[is_near] * V + i[is_near], i[is_near] * V + o[is_near]]
+    o, i = np.divmod(np.unique(np.concatenate(keys)), V)
+    is_below = np.einsum("pd,pd->p", x[i] - x[o], n[o]) < 0.0
+    return np.stack([o, i], axis=1)[is_below]
 
 
 def _cuts(reach: Array) -> Array:
-    """Where to cut ascending reaches, so that those of a part are alike by a factor of the root of 2."""
+    """Return where to split ascending values so that those of a part differ by a factor of at most sqrt(2)."""
     octave = np.floor(2.0 * np.log2(np.maximum(reach, 1e-30)))
     return np.flatnonzero((np.diff(octave) > 0) | (np.arange(1, len(reach)) % _AT_ONCE == 0)) + 1

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from wgsss import frame as shared
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
-from wgsss.bake.sam.patch_form_factors import ORDER, near_pairs
+from wgsss.bake.sam.patch_form_factors import NEAR_ORDER, near_pairs
 from wgsss.cache import Arrays, KeyPart, cached
 from wgsss.frame import Frame
 from wgsss.graph import Graph, Handle
@@ -78,7 +78,7 @@ def _scale(body: Body, plan: Plan) -> Array:
     def make() -> Arrays:
         o, i = near_pairs(mesh).T
         distance = np.maximum(np.linalg.norm(mesh.positions[o] - mesh.positions[i], axis=1), np.exp2(0.5 * held.low))
-        near = FormFactors(gpu, mesh, profile).of(np.stack([o, i], axis=1), most=ORDER)
+        near = FormFactors(gpu, mesh, profile).of(np.stack([o, i], axis=1), max_order=NEAR_ORDER)
         more = near - fan_areas(mesh)[i, None] * profile.reflectance(distance)
         more = np.stack([np.bincount(o, more[:, channel], V) for channel in range(3)], axis=1)
 

@@ -1,16 +1,25 @@
-"""The irradiances that senders are chosen by."""
+"""The training lights and their principal components."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wgsss.bake.sam.fit.training import COMPONENTS, EVEN_WEIGHT, SKIES, SKY_WEIGHT, SUNS, compressed, spiral, training
+from wgsss.bake.sam.fit.training import (
+    COMPONENTS,
+    EVEN_WEIGHT,
+    SKIES,
+    SKY_WEIGHT,
+    SUNS,
+    compressed,
+    spiral,
+    training_lights,
+)
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes import sphere
 
 
 def two_balls() -> Mesh:
-    """A large ball to the right of a small one, which is in its shadow from there."""
+    """Return a small ball and a large one to its right, which casts a shadow on it for light from the right."""
     small, large = sphere(1.0, 100), sphere(4.0, 200)
     return Mesh(
         np.concatenate([small.positions, large.positions + np.array([8.0, 0.0, 0.0])]),
@@ -22,33 +31,33 @@ def test_suns_cast_shadows():
     mesh = two_balls()
     n, small = mesh.normals, np.arange(len(mesh.positions)) < len(sphere(1.0, 100).positions)
     towards = spiral(SUNS)
-    light = training(mesh)[:SUNS]
+    light = training_lights(mesh)[:SUNS]
     right, left = np.argmax(towards[:, 0]), np.argmin(towards[:, 0])
     assert not light[right][small].any()
     np.testing.assert_allclose(light[left][small], np.maximum(n[small] @ towards[left], 0.0), atol=1e-5)
     np.testing.assert_allclose(light[right][~small], np.maximum(n[~small] @ towards[right], 0.0), atol=1e-5)
 
 
-def test_skies_and_even_light_are_everywhere():
-    found = training(two_balls())
-    assert found.shape[0] == SUNS + SKIES + 1
-    np.testing.assert_allclose(found[-1], EVEN_WEIGHT)
-    skies = found[SUNS:-1] / SKY_WEIGHT
+def test_skies_and_uniform_light_reach_every_vertex():
+    lights = training_lights(two_balls())
+    assert lights.shape[0] == SUNS + SKIES + 1
+    np.testing.assert_allclose(lights[-1], EVEN_WEIGHT)
+    skies = lights[SUNS:-1] / SKY_WEIGHT
     assert skies.min() >= 0.0 and skies.max() <= 1.0 + 1e-6
     np.testing.assert_allclose(skies.mean(axis=0), 0.5, atol=0.02)  # half of every sky is above
 
 
-def test_directions_are_spread_evenly():
+def test_directions_of_a_spiral_are_spread_evenly():
     w = spiral(SUNS)
     np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0)
     np.testing.assert_allclose(w.T @ w / SUNS, np.eye(3) / 3, atol=0.01)
     np.testing.assert_allclose(w.mean(axis=0), 0.0, atol=0.01)
 
 
-def test_compressed_light_has_the_products_of_all():
-    """Of means over parts of the surface, which fade into each other as what scatters does."""
+def test_compressed_lights_have_the_same_dot_products():
+    """The dot products of smooth means over parts of the surface are nearly those under all lights."""
     mesh = two_balls()
-    lights, V = training(mesh), len(mesh.positions)
+    lights, V = training_lights(mesh), len(mesh.positions)
     few = compressed(lights, np.ones(V))
     assert few.shape == (V, COMPONENTS)
     nearness = np.exp(-np.square(mesh.positions[::40, None] - mesh.positions).sum(axis=2) / 2.0)

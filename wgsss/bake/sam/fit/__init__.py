@@ -1,1 +1,1 @@
-"""Our choice of senders: those whose weighted sum best reproduces M_back under a set of training lights."""
+"""The selection `fit`, our extension of the paper: senders and weights fitted to M_back under training lights."""

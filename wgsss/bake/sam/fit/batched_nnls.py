@@ -1,4 +1,8 @@
-"""Least squares by weights that are not negative, of many small problems at once."""
+"""Nonnegative least squares for many small problems at once.
+
+All problems of a batch run through block principal pivoting (Kim & Park 2011) together, so that each iteration is one
+batched linear solve.
+"""
 
 from __future__ import annotations
 
@@ -10,41 +14,43 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 
 _DAMPING = 1e-4
-"""of the mean square of a support: two senders that see the same light share it"""
+"""added to the diagonal, as a share of its mean: columns that are nearly equal then get nearly equal weights"""
 _RETURNS = 3
-"""times that what was left out is asked whether it should come back"""
+"""number of iterations in which a column whose weight was set to 0 may come back"""
 
 
 def batched_nnls(gram: Array, moment: Array) -> Array:
-    """Weights (B, k, c), float32, at least 0, of k columns by which B times c responses are nearest.
+    """Return the nonnegative weights of k columns whose weighted sum is nearest to a target, float32 (B, k, c).
+
+    There are B problems with the same columns for each of their c targets.
 
     Args:
-        gram: float32 (B, k, k), the products of the columns with each other.
-        moment: float32 (B, k, c), their products with the responses.
+        gram: float32 (B, k, k), the dot products of the columns with each other.
+        moment: float32 (B, k, c), their dot products with the targets.
 
-    Principal pivoting by blocks (Kim & Park 2011): what is negative is left out, what would then lessen the error comes
-    back, all of it at once.
+    In each iteration, all columns with a negative weight are removed, and all removed columns that would lessen the
+    error come back.
     """
     k = moment.shape[1]
     mean = np.trace(gram, axis1=1, axis2=2) / max(k, 1)
     G = gram + (_DAMPING * mean + 1e-30)[:, None, None] * np.eye(k, dtype=np.float32)
     weight = np.linalg.solve(G, moment)
-    b, channel = np.nonzero((weight < 0.0).any(axis=1))
+    b, target = np.nonzero((weight < 0.0).any(axis=1))
     if not len(b):
         return weight
-    G, r = G[b], moment[b, :, channel]
+    G, r = G[b], moment[b, :, target]
     diagonal = np.einsum("nkk->nk", G)
-    x = weight[b, :, channel]
-    free = x > 0.0
-    for turn in range(_RETURNS + k):
-        both = free[:, :, None] & free[:, None, :]
-        own = np.where(free, 0.0, diagonal)[:, :, None] * np.eye(k, dtype=np.float32)
-        x = np.linalg.solve(np.where(both, G, own), np.where(free, r, 0.0)[..., None])[..., 0]
-        after = free & (x > 0.0)
-        if turn < _RETURNS:
-            after |= ~free & (r - (G @ x[..., None])[..., 0] > 1e-6 * np.abs(r))
-        if np.array_equal(after, free):
+    x = weight[b, :, target]
+    is_free = x > 0.0
+    for iteration in range(_RETURNS + k):
+        both_free = is_free[:, :, None] & is_free[:, None, :]
+        removed = np.where(is_free, 0.0, diagonal)[:, :, None] * np.eye(k, dtype=np.float32)
+        x = np.linalg.solve(np.where(both_free, G, removed), np.where(is_free, r, 0.0)[..., None])[..., 0]
+        next_free = is_free & (x > 0.0)
+        if iteration < _RETURNS:
+            next_free |= ~is_free & (r - (G @ x[..., None])[..., 0] > 1e-6 * np.abs(r))
+        if np.array_equal(next_free, is_free):
             break
-        free = after
-    weight[b, :, channel] = np.maximum(x, 0.0)
+        is_free = next_free
+    weight[b, :, target] = np.maximum(x, 0.0)
     return weight

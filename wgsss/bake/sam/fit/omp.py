@@ -1,4 +1,8 @@
-"""Which few senders stand for many: orthogonal matching pursuit with weights that are not negative."""
+"""Orthogonal matching pursuit with nonnegative weights: choose the few senders whose sum approximates a response best.
+
+A response is what a receiver gets under T training lights, a vector of T numbers. Each candidate sender has such a
+vector, too: its irradiance under each light. The pursuit adds the candidates one by one and then revises each choice.
+"""
 
 from __future__ import annotations
 
@@ -12,78 +16,85 @@ from wgsss.bake.sam.fit.batched_nnls import batched_nnls
 Array = npt.NDArray[Any]
 
 ROUNDS = 2
-"""times that each choice is made once more; of the worst triples, one in two is then the best that there is"""
-_OWN = 0.01
-"""of a candidate's square, at least, that counts as not told by the other choices: less is rounding"""
+"""number of times that all choices are revised: after two, half of the hardest triples in tests are optimal"""
+_MIN_RESIDUAL = 0.01
+"""smallest part of a candidate's squared norm that counts as independent of the other choices: less is rounding"""
 
 
-def omp(seen: Array, response: Array, n: int) -> tuple[Array, Array]:
-    """The `n` candidates, and their weights, by whose sum a response is nearest in the least squares.
+def omp(candidates: Array, response: Array, n: int) -> tuple[Array, Array]:
+    """Choose, for each response, the `n` candidates and weights whose weighted sum is nearest to it in least squares.
 
     Args:
-        seen: float32 (B, C, T), T numbers for each of C candidates of B problems; all 0 where there is none.
-        response: float32 (B, 3, P, T), those of P responses in three channels.
+        candidates: float32 (B, C, T), the vectors of C candidates of B problems; all 0 where there is none.
+        response: float32 (B, 3, P, T), P responses of each problem in three colour channels.
 
     Returns:
-        int64 (B, P, n), of the candidates, different ones where there are as many, and float32 (B, P, n, 3), their
-        weights: at least 0, and 0 where a candidate adds nothing.
+        The indices of the chosen candidates, int64 (B, P, n), all different where there are enough, and their weights,
+        float32 (B, P, n, 3), at least 0, and 0 where a candidate adds nothing.
 
-    They are chosen for the sum of the channels, each by how much it lessens the error if the weights of the others
-    follow (orthogonal least squares, Chen, Billings & Luo 1989); then each choice is made anew, the others being known,
-    ROUNDS times. The weights are each channel's own.
+    The choice is made for the sum of the channels. Each step takes the candidate that lessens the error most after the
+    weights of the others are fitted again (orthogonal least squares, Chen, Billings & Luo 1989). Each choice is then
+    revised with all others fixed, ROUNDS times. Finally each channel gets its own weights.
     """
-    (B, C, T), P = seen.shape, response.shape[2]
+    (B, C, T), P = candidates.shape, response.shape[2]
     rows, count = B * P, min(n, C)
     problem = np.repeat(np.arange(B), P)
-    across = seen.transpose(0, 2, 1)
-    goal = response.sum(axis=1)
-    wanted = (goal @ across).reshape(rows, C)
-    square = np.einsum("bct,bct->bc", seen, seen)[problem] + np.float32(1e-30)
+    transposed = candidates.transpose(0, 2, 1)
+    target = response.sum(axis=1)
+    correlation = (target @ transposed).reshape(rows, C)
+    square = np.einsum("bct,bct->bc", candidates, candidates)[problem] + np.float32(1e-30)
     chosen = np.zeros((rows, count), np.int64)
     product = np.zeros((rows, count, C), np.float32)
-    """of what was chosen with all candidates"""
+    """the dot products of the chosen candidates with all candidates"""
 
-    def best(others: Array) -> Array:
-        """The candidate (rows,) that adds most to what was chosen in some of the places."""
-        there, by = chosen[:, others], product[:, others]
-        left, own = wanted, square
-        if len(others):
-            weight, gram, _ = fitted(there, by)
-            left = wanted - (weight[:, None] @ by)[:, 0]
-            damped = gram + 1e-6 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(len(others))
-            told = np.linalg.inv(damped + 1e-30 * np.eye(len(others))).astype(np.float32) @ by
-            told *= by
-            own = np.maximum(square - told.sum(axis=1), _OWN * square)
-        score = np.maximum(left, 0.0)
-        score *= score
-        score /= own
-        np.put_along_axis(score, there, -1.0, axis=1)
-        return score.argmax(axis=1)
+    def best_addition(slots: Array) -> Array:
+        """Return the candidate (rows,) that lessens the error most when added to the choices in some slots."""
+        choice, choice_product = chosen[:, slots], product[:, slots]
+        residual, independent = correlation, square
+        if len(slots):
+            weight, gram, _ = fit(choice, choice_product)
+            residual = correlation - (weight[:, None] @ choice_product)[:, 0]
+            damped = gram + 1e-6 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(len(slots))
+            inverse = np.linalg.inv(damped + 1e-30 * np.eye(len(slots))).astype(np.float32)
+            projected = inverse @ choice_product
+            projected *= choice_product
+            independent = np.maximum(square - projected.sum(axis=1), _MIN_RESIDUAL * square)
+        gain = np.maximum(residual, 0.0)
+        gain *= gain
+        gain /= independent
+        np.put_along_axis(gain, choice, -1.0, axis=1)
+        return gain.argmax(axis=1)
 
-    def fitted(there: Array, by: Array) -> tuple[Array, Array, Array]:
-        """Weights (rows, k) of choices, their products with each other, and by how much they lessen the error."""
-        gram = np.take_along_axis(by, np.broadcast_to(there[:, None], (*there.shape, there.shape[1])), axis=2)
-        moment = np.take_along_axis(wanted, there, axis=1)
+    def fit(choice: Array, choice_product: Array) -> tuple[Array, Array, Array]:
+        """Return the weights (rows, k) of choices, their dot products (rows, k, k), and how much they lessen the error.
+
+        `choice_product` (rows, k, C) holds their dot products with all candidates.
+        """
+        columns = np.broadcast_to(choice[:, None], (*choice.shape, choice.shape[1]))
+        gram = np.take_along_axis(choice_product, columns, axis=2)
+        moment = np.take_along_axis(correlation, choice, axis=1)
         weight = batched_nnls(gram, moment[..., None])[..., 0]
         gain = 2.0 * (weight * moment).sum(axis=1) - np.einsum("ri,rij,rj->r", weight, gram, weight)
         return weight, gram, gain
 
-    def products(which: Array) -> Array:
-        return (seen[problem, which].reshape(B, P, T) @ across).reshape(rows, C)
+    def products(candidate: Array) -> Array:
+        """Return the dot products (rows, C) of one candidate of each row (rows,) with all candidates."""
+        return (candidates[problem, candidate].reshape(B, P, T) @ transposed).reshape(rows, C)
 
     for k in range(count):
-        chosen[:, k] = best(np.arange(k))
+        chosen[:, k] = best_addition(np.arange(k))
         product[:, k] = products(chosen[:, k])
-    gain = fitted(chosen, product)[2]
+    gain = fit(chosen, product)[2]
     for k in ROUNDS * list(range(count)) if count > 1 else ():
-        other = best(np.delete(np.arange(count), k))
-        there, by = chosen.copy(), product.copy()
-        there[:, k], by[:, k] = other, products(other)
-        now = fitted(there, by)[2]
-        better = (now > gain) & (other != chosen[:, k])
-        chosen[better], product[better], gain[better] = there[better], by[better], now[better]
-    support = seen[problem[:, None], chosen]
-    of_channels = response.transpose(0, 2, 3, 1).reshape(rows, T, 3)
-    weights = batched_nnls(fitted(chosen, product)[1], support @ of_channels)
-    missing = ((0, 0), (0, 0), (0, n - count))
-    return np.pad(chosen.reshape(B, P, count), missing), np.pad(weights.reshape(B, P, count, 3), (*missing, (0, 0)))
+        other = best_addition(np.delete(np.arange(count), k))
+        revised, revised_product = chosen.copy(), product.copy()
+        revised[:, k], revised_product[:, k] = other, products(other)
+        revised_gain = fit(revised, revised_product)[2]
+        is_better = (revised_gain > gain) & (other != chosen[:, k])
+        chosen[is_better], product[is_better] = revised[is_better], revised_product[is_better]
+        gain[is_better] = revised_gain[is_better]
+    support = candidates[problem[:, None], chosen]
+    channels = response.transpose(0, 2, 3, 1).reshape(rows, T, 3)
+    weights = batched_nnls(fit(chosen, product)[1], support @ channels)
+    padding = ((0, 0), (0, 0), (0, n - count))
+    return np.pad(chosen.reshape(B, P, count), padding), np.pad(weights.reshape(B, P, count, 3), (*padding, (0, 0)))

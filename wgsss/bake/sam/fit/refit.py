@@ -1,4 +1,8 @@
-"""Entries that were fitted one by one, refitted to what the mixtures that read them still lack."""
+"""Adjusts the weights of entries to the mixtures that read them.
+
+The entries were fitted so that each row alone reproduces M_back. Once the rows are mixed (`neighbour_mixture`), other
+weights have a smaller error. All rows take a step at the same time, short enough that the error cannot grow.
+"""
 
 from __future__ import annotations
 
@@ -13,49 +17,57 @@ from wgsss.bake.sam.sender_map import NeighbourMixture, gather_rows
 
 Array = npt.NDArray[Any]
 
-_LEAST = 0.1
-"""of a weight, that stays: what gathers nothing is no part of any mixture, and would not come back"""
+_MIN_FACTOR = 0.1
+"""smallest factor by which an entry is scaled: a row scaled to 0 would leave all mixtures and could never return"""
 
 
 def refit(
-    mix: NeighbourMixture, vertices: Array, rows: Array, sender: Array, weight: Array, light: Array, response: Array
+    mixture: NeighbourMixture,
+    vertices: Array,
+    rows: Array,
+    sender: Array,
+    weight: Array,
+    light: Array,
+    response: Array,
 ) -> None:
-    """Scale the entries of rows (k,) towards those by which mixtures are nearest to what is wanted.
+    """Scale the weights of entries so that the mixtures come nearer to the vertices' responses.
 
     Args:
-        mix: the mixtures, whose tints do not count.
-        vertices: those that are mixtures of anything.
-        rows: those that gather anything, in ascending order.
-        sender: int32 (R, N), rows of `light`.
-        weight: float32 (R, N, 3), changed: each entry's three by one factor.
-        light: float32 (S, T), what senders have of T lights.
-        response: float32 (V, T), what vertices should receive of them, in all channels together.
+        mixture: the mixtures; their tints are ignored.
+        vertices: int (m,), the vertices whose mixtures are not empty.
+        rows: int (k,), in ascending order, the rows that gather anything.
+        sender: int32 (R, N), indices into the rows of `light`.
+        weight: float32 (R, N, 3), changed in place: the three channels of an entry by the same factor.
+        light: float32 (S, T), the irradiance of each sender under T training lights.
+        response: float32 (V, T), exact M_back under these lights, added over the channels.
 
-    All rows move at once, each as if all others that it is mixed with moved as far: so the error cannot grow.
+    Every row solves a nonnegative least squares for the factors of its own entries, as if all other rows in its
+    mixtures took a step of the same size.
     """
     from scipy.sparse import csr_array
 
-    read = np.searchsorted(rows, mix.row[vertices])
+    read = np.searchsorted(rows, mixture.row[vertices])
     ends = np.arange(len(vertices) + 1) * read.shape[1]
     shape = (len(vertices), len(rows))
-    parts = csr_array((mix.weight[vertices].ravel().astype(np.float32), read.ravel(), ends), shape=shape)
-    lent = parts.T.tocsr()
-    price = lent @ parts.sum(axis=1)  # the sum of a row of the parts' square, and so at least its largest eigenvalue
-    lack = response[vertices]
+    mixing = csr_array((mixture.weight[vertices].ravel().astype(np.float32), read.ravel(), ends), shape=shape)
+    transposed = mixing.T.tocsr()
+    # Row sums of transposed @ mixing: since no weight is negative, they bound its largest eigenvalue.
+    step = transposed @ mixing.sum(axis=1)
+    residual = response[vertices]
 
-    def miss(which: Array) -> None:
-        some, at = np.unique(read[which], return_inverse=True)
-        there = csr_array((parts[which].data, at.ravel(), np.arange(len(which) + 1) * read.shape[1]))
-        lack[which] -= there @ gather_rows(sender[rows[some]], weight[rows[some]], light)
+    def subtract_mixtures(some: Array) -> None:
+        used, index = np.unique(read[some], return_inverse=True)
+        mixing_used = csr_array((mixing[some].data, index.ravel(), np.arange(len(some) + 1) * read.shape[1]))
+        residual[some] -= mixing_used @ gather_rows(sender[rows[used]], weight[rows[used]], light)
 
-    def scale(which: Array) -> None:
-        some, cost = rows[which], price[which, None, None]
-        seen = weight[some].sum(axis=2)[..., None] * light[sender[some]]
-        gram = cost * (seen @ seen.transpose(0, 2, 1))
-        gram += 1e-5 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(seen.shape[1], dtype=np.float32)
-        moment = gram.sum(axis=2, keepdims=True) + seen @ (lent[which] @ lack)[..., None]
+    def scale_entries(some: Array) -> None:
+        row, cost = rows[some], step[some, None, None]
+        entry = weight[row].sum(axis=2)[..., None] * light[sender[row]]
+        gram = cost * (entry @ entry.transpose(0, 2, 1))
+        gram += 1e-5 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(entry.shape[1], dtype=np.float32)
+        moment = gram.sum(axis=2, keepdims=True) + entry @ (transposed[some] @ residual)[..., None]
         factor = batched_nnls(gram, moment)
-        weight[some] *= np.where(cost > 0.0, np.maximum(factor, _LEAST), 1.0)
+        weight[row] *= np.where(cost > 0.0, np.maximum(factor, _MIN_FACTOR), 1.0)
 
-    in_blocks(miss, np.arange(len(vertices)))
-    in_blocks(scale, np.arange(len(rows)))
+    in_blocks(subtract_mixtures, np.arange(len(vertices)))
+    in_blocks(scale_entries, np.arange(len(rows)))

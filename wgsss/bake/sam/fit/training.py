@@ -1,4 +1,8 @@
-"""Irradiance that a mesh may meet: what the choice of its senders is tried on."""
+"""The training lights: irradiance distributions over a mesh on which senders are fitted.
+
+They are suns from many directions with shadows, half skies without shadows, and uniform light. Senders that reproduce
+M_back under all of these also do so under most other lights, which are nearly mixtures of these.
+"""
 
 from __future__ import annotations
 
@@ -13,36 +17,46 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 SUNS = 160
-"""directions of light, with shadows"""
+"""number of directional lights, with shadows"""
 SKIES = 24
-"""half skies, without shadows: what suns never reach is lit by something too"""
+"""number of half skies, without shadows, so that places that no sun reaches are lit, too"""
 SKY_WEIGHT, EVEN_WEIGHT = 1.0, 3.5
-"""of a sky's error and of that under even light, which sets how much light there is in all, over a sun's"""
+"""weights of the errors under a sky and under uniform light, relative to a sun; uniform light sets the total energy"""
 COMPONENTS = 128
-"""numbers that irradiances are compressed to"""
+"""number of components that the lights are compressed to"""
 _AT_ONCE = 1 << 16  # vertices
-_LIFT = 1e-4  # of the mesh's extent: how far above the surface rays start
+_LIFT = 1e-4  # height above the surface where shadow rays start, as a share of the mesh's extent
 
 
-def training(mesh: Mesh) -> Array:
-    """float32 (SUNS + SKIES + 1, V): irradiances at the vertices, each times the weight of its error."""
+def training_lights(mesh: Mesh) -> Array:
+    """Return the irradiance of each training light at the vertices, float32 (SUNS + SKIES + 1, V), without unit.
+
+    A light that falls perpendicularly has an irradiance of 1. Each light is multiplied by the weight of its error.
+    """
     n = mesh.normals.astype(np.float64)
     x = mesh.positions + _LIFT * float(np.ptp(mesh.bounds, axis=0).max()) * n
     caster = rays.Caster(mesh.positions, mesh.faces)
-    found = np.zeros((SUNS + SKIES + 1, len(n)), np.float32)
-    for light, w in zip(found, spiral(SUNS), strict=False):
+    lights = np.zeros((SUNS + SKIES + 1, len(n)), np.float32)
+    for light, w in zip(lights, spiral(SUNS), strict=False):
         cosine = n @ w
         lit = np.flatnonzero(cosine > 0.0)
-        free = ~caster.blocked(x[lit], np.broadcast_to(w, (len(lit), 3)))
-        light[lit] = cosine[lit] * free
-    found[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + spiral(SKIES) @ n.T)
-    found[-1] = EVEN_WEIGHT
-    return found
+        is_visible = ~caster.blocked(x[lit], np.broadcast_to(w, (len(lit), 3)))
+        light[lit] = cosine[lit] * is_visible
+    lights[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + spiral(SKIES) @ n.T)
+    lights[-1] = EVEN_WEIGHT
+    return lights
 
 
 def compressed(lights: Array, area: Array) -> Array:
-    """float32 (V, COMPONENTS): irradiances (T, V) over vertices of `area` (V,) in the directions, of all mixtures of
-    lights, in which they differ most. Products between what is linear in them are nearly as before, and cost less."""
+    """Return the principal components of irradiances, float32 (V, COMPONENTS).
+
+    Dot products over the components approximate dot products over all lights, for anything that is linear in the
+    irradiance, and cost less.
+
+    Args:
+        lights: float32 (T, V), the irradiance of T lights at the vertices.
+        area: (V,), the weights of the vertices in the principal component analysis.
+    """
     gram = np.zeros((len(lights), len(lights)))
     for first in range(0, len(area), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
@@ -53,7 +67,7 @@ def compressed(lights: Array, area: Array) -> Array:
 
 
 def spiral(count: int) -> Array:
-    """Unit vectors (count, 3), spread evenly over the sphere."""
+    """Return unit vectors (count, 3), spread evenly over the sphere along a spiral."""
     i = np.arange(count) + 0.5
     y, around = 1.0 - 2.0 * i / count, np.pi * (3.0 - np.sqrt(5.0)) * i
     ring = np.sqrt(1.0 - y * y)

@@ -1,1 +1,4 @@
-"""Choice of senders as published (Maisch & Ropinski 2017): the largest form factors of the mesh or of a coarse one."""
+"""The selections that the paper describes (Maisch & Ropinski 2017): the senders of largest form factor.
+
+`top` chooses them among the vertices of the mesh, `coarse` among those of a simplified mesh.
+"""

@@ -1,4 +1,8 @@
-"""Vertices in blocks of near ones that face the same way, and what one block can send to another at most."""
+"""Blocks of neighbouring vertices, with bounds of what one block can send to another.
+
+The search for the largest form factors (`top`) visits the blocks of senders in the order of an upper bound of what any
+of their vertices can contribute, and stops where no later block can contribute more than the senders already found.
+"""
 
 from __future__ import annotations
 
@@ -17,74 +21,62 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 _MODULE = "sam/top"
-_ROUNDING = 1e-5  # of cosines in float32
-_ROW = 16  # blocks in a row, that are looked at together first
-_PER_ROW = 4  # of those, on average, that are worth a look
-_NORMALS = 8.0  # spacings of the vertices, about a block's width: how far apart opposite normals count as
+_ROUNDING = 1e-5  # error of cosines in float32
+_ROW = 16  # blocks in a row: rows are compared first, then the blocks of the best rows
+_PER_ROW = 4  # blocks of a row, on average, that are worth a visit
+_NORMAL_SCALE = 8.0  # spacings of the vertices, about the width of a block, that opposite normals count as apart
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Of N groups of fans, float32."""
+    """Bounds of N groups of fans: of their places, sizes and normals."""
 
     low: Array
-    """(N, 3), mm, of the fans' centroids"""
+    """(N, 3), mm: the lower corner of a box around the centroids of a group's fans"""
     high: Array
-    """(N, 3), mm"""
+    """(N, 3), mm: the upper corner"""
     extent: Array
-    """(N,), mm^2: the least mean squared distance of a fan from its centroid"""
+    """(N,), mm^2: the smallest extent of a fan, its mean squared distance from its centroid"""
     area: Array
-    """(N,), mm^2: the largest fan's"""
+    """(N,), mm^2: the area of the largest fan"""
     axis: Array
-    """(N, 3), of length 1: the mean normal"""
+    """(N, 3), unit: the direction of the mean normal"""
     cone: Array
-    """(N,), radians about it, within which all normals lie"""
+    """(N,), radians: the largest angle between the axis and a normal"""
 
     @classmethod
-    def of(cls, fans: Fans, order: Array, first: Array) -> Bounds:
-        """Of fans in an `order`, in groups that begin at `first`."""
-        none = np.zeros(len(order))
-        return cls._around(
-            fans.centre[order],
-            fans.centre[order],
-            fans.extent[order],
-            fans.area[order],
-            fans.normal[order],
-            none,
-            first,
-        )
+    def of_fans(cls, fans: Fans, order: Array) -> Bounds:
+        """Return the bounds of single fans, in an order (N,) of vertices."""
+        centre = fans.centre[order]
+        return cls(centre, centre, fans.extent[order], fans.area[order], fans.normal[order], np.zeros(len(order)))
 
-    def merged(self, count: int) -> Bounds:
-        """Of `count` groups in a row, as one; the last may have fewer."""
-        return self._around(
-            self.low, self.high, self.extent, self.area, self.axis, self.cone, np.arange(0, len(self.area), count)
-        )
-
-    def __getitem__(self, which: Any) -> Bounds:
-        return Bounds(*(value[which] for value in vars(self).values()))
-
-    @classmethod
-    def _around(
-        cls, low: Array, high: Array, extent: Array, area: Array, axis: Array, cone: Array, first: Array
-    ) -> Bounds:
+    def merged(self, first: Array) -> Bounds:
+        """Return the bounds, float32, of unions of consecutive groups, which begin at the indices `first` (M,)."""
         if not len(first):
-            return cls(low, high, extent, area, axis, cone)
-        mean = np.add.reduceat(axis, first, axis=0)
+            return self
+        mean = np.add.reduceat(self.axis, first, axis=0)
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-30)
-        whose = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(area))))
-        off = np.arccos(np.clip(np.einsum("nk,nk->n", axis, mean[whose]) - _ROUNDING, -1.0, 1.0)) + cone
-        found = (
-            np.minimum.reduceat(low, first, axis=0),
-            np.maximum.reduceat(high, first, axis=0),
-            np.minimum.reduceat(extent, first),
-            np.maximum.reduceat(area, first),
+        union = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(self.area))))
+        cosine = np.einsum("nk,nk->n", self.axis, mean[union]) - _ROUNDING
+        angle = np.arccos(np.clip(cosine, -1.0, 1.0)) + self.cone
+        values = (
+            np.minimum.reduceat(self.low, first, axis=0),
+            np.maximum.reduceat(self.high, first, axis=0),
+            np.minimum.reduceat(self.extent, first),
+            np.maximum.reduceat(self.area, first),
             mean,
-            np.maximum.reduceat(off, first),
+            np.maximum.reduceat(angle, first),
         )
-        return cls(*(value.astype(np.float32) for value in found))
+        return Bounds(*(value.astype(np.float32) for value in values))
 
-    def squared(self, other: Bounds) -> Array:
-        """mm^2, (...): the least that the mean squared distance between a fan of one and one of the other can be."""
+    def __getitem__(self, index: Any) -> Bounds:
+        """Return the bounds of some groups, by a numpy index of any shape."""
+        return Bounds(
+            self.low[index], self.high[index], self.extent[index], self.area[index], self.axis[index], self.cone[index]
+        )
+
+    def least_square(self, other: Bounds) -> Array:
+        """Return a lower bound of the mean squared distance between two fans, one of each group (...), mm^2."""
         square = self.extent + other.extent
         for k in range(3):
             gap = np.maximum(other.low[..., k] - self.high[..., k], self.low[..., k] - other.high[..., k])
@@ -92,102 +84,113 @@ class Bounds:
             square += np.square(gap, out=gap)
         return square
 
-    def face_away(self, other: Bounds) -> Array:
-        """bool (...): whether a normal of one and one of the other can be at more than a right angle."""
+    def may_face_away(self, other: Bounds) -> Array:
+        """Return whether two normals, one of each group, can be at more than a right angle (eq. 14), bool (...)."""
         cosine = sum(self.axis[..., k] * other.axis[..., k] for k in range(3))
-        away: Array = cosine <= np.sin(np.minimum(self.cone + other.cone, 0.5 * np.pi)) + _ROUNDING
-        return away
+        may_face_away: Array = cosine <= np.sin(np.minimum(self.cone + other.cone, 0.5 * np.pi)) + _ROUNDING
+        return may_face_away
 
 
 class Blocks:
-    """The vertices of a mesh that have a fan, in blocks, as `wgsl/sam/top.wgsl` reads them.
-
-    `reach` is in mm: beyond, nothing is sent. Where `sending` (V,) is given, only those vertices send, and only the
-    others receive.
-    """
+    """The vertices of a mesh that have faces, in blocks of at most GROUP, as `wgsl/sam/top.wgsl` reads them."""
 
     def __init__(self, mesh: Mesh, fans: Fans, R: Reflectance, reach: float, sending: Array | None = None) -> None:
+        """Sort the vertices into blocks and prepare the tables of the search.
+
+        Args:
+            reach: mm; senders that are farther away are ignored.
+            sending: bool (V,); if given, only these vertices send, and only the others receive.
+        """
         module = wgsl.load(_MODULE)
         sending = np.ones(len(fans.area), bool) if sending is None else sending
-        order, edges = _blocks(fans, (fans.area > 0.0) & sending, module.constants["GROUP"])
+        order, edges = _in_blocks(fans, (fans.area > 0.0) & sending, module.constants["GROUP"])
         self.senders = len(edges)
-        """the first blocks, which send"""
+        """the number of blocks of senders, which are the first blocks"""
         self.receivers = slice(0, self.senders)
-        """the blocks that receive: the same, or where not all vertices send, those of the others"""
+        """the blocks of receivers: the same ones, or with `sending` those after them"""
         if not sending.all():
-            others, more = _blocks(fans, (fans.area > 0.0) & ~sending, module.constants["GROUP"])
+            others, more = _in_blocks(fans, (fans.area > 0.0) & ~sending, module.constants["GROUP"])
             self.receivers = slice(len(edges), len(edges) + len(more))
             order, edges = np.concatenate([order, others]), np.concatenate([edges, len(order) + more])
         self.order = order
         """int (N,): the vertices in the order of the blocks"""
         self.edges = np.append(edges, len(order))
-        """int (B + 1,): where blocks begin in it"""
-        o = self.order
+        """int (B + 1,): where each block begins in `order`, and N"""
         vertex = {"position": mesh.positions, "area": fans.area, "normal": mesh.normals, "extent": fans.extent}
-        vertex = {name: values[o] for name, values in (*vertex.items(), ("centre", fans.centre))}
+        vertex = {name: values[order] for name, values in (*vertex.items(), ("centre", fans.centre))}
         self.vertices = module.layout("array<Vertex>").pack(vertex)
 
-        self.bounds = Bounds.of(fans, o, edges)
+        self.bounds = Bounds.of_fans(fans, order).merged(edges)
         self.ranges = module.layout("array<Block>").pack(
             {"first": edges, "end": self.edges[1:], "area": self.bounds.area}
         )
-        self.rows = self.bounds[: self.senders].merged(_ROW)
+        self.rows = self.bounds[: self.senders].merged(np.arange(0, self.senders, _ROW))
 
         end = np.searchsorted(R.squares, reach * reach)
         total = R.R[: max(end, 1), :3].astype(np.float64).sum(axis=1)
         self.first = R.first
         """the leading bits of the first squared distance of `total`"""
         self.total = np.append(total, 0.0).astype(np.float32)
-        """float32 (k,): R_d of all channels over the squared distance; 0 in the last"""
-        self._most = np.maximum.accumulate(self.total[::-1])[::-1]  # at any larger distance: R may not fall steadily
-        least, largest = (int(np.float32(v).view(np.uint32)) >> shift() for v in (self._most[-2], self._most[0]))
+        """float32 (k,), 1/mm^2: R_d, summed over the channels, over the squared distance; the last is 0"""
+        self._bound = np.maximum.accumulate(self.total[::-1])[::-1]  # of R_d at this distance or any larger one
+        least, largest = (int(np.float32(v).view(np.uint32)) >> shift() for v in (self._bound[-2], self._bound[0]))
         self.first_reach = max(least, 1)
+        """the leading bits of the first value of R_d of `reach`"""
         levels = squares(self.first_reach, max(largest, self.first_reach) + 1)
-        edges = np.append(R.squares, np.inf)
-        self.reach = edges[np.searchsorted(-self._most, -levels, side="right")].astype(np.float32)
-        """float32 (m,), mm^2: the squared distance from which on `total` is less, over its own leading bits"""
+        ends = np.append(R.squares, np.inf)
+        self.reach = ends[np.searchsorted(-self._bound, -levels, side="right")].astype(np.float32)
+        """float32 (m,), mm^2: the inverse of `total`, over the leading bits of R_d: the squared distance beyond which
+        R_d is smaller"""
 
-    def candidates(self, groups: Array, listed: int) -> tuple[Array, Array, Array]:
-        """For each group (g,), a block itself, the blocks that can send the most to one of it: which (g, k) they are,
-        the most, 0 for none (g, k), in falling order, and the most (g,) that others can send."""
+    def candidates(self, groups: Array, count: int) -> tuple[Array, Array, Array]:
+        """Return, for each group of receivers, the blocks that can contribute most.
+
+        Args:
+            groups: int (g,), the blocks of the receivers.
+            count: the largest number of blocks to return for each group.
+
+        Returns:
+            The blocks (g, k) in falling order of their bounds; the bounds (g, k) of what a vertex of a block can
+            contribute to one of the group, 0 for no block; and the largest bound (g,) of the blocks left out.
+        """
         own = self.bounds[groups[:, None]]
-        most, rows, rest = _largest(self._most_between(own, self.rows), max(listed // _PER_ROW, 1))
-        inside = (rows[:, :, None] * _ROW + np.arange(_ROW)).reshape(len(groups), -1)
-        there = np.minimum(inside, self.senders - 1)
-        each = np.where(inside < self.senders, self._most_between(own, self.bounds[there]), np.float32(0.0))
-        most, chosen, others = _largest(each, listed)
-        return np.take_along_axis(there, chosen, axis=1), most, np.maximum(rest, others)
+        _, rows, rest_of_rows = _largest(self._contribution_bound(own, self.rows), max(count // _PER_ROW, 1))
+        block = (rows[:, :, None] * _ROW + np.arange(_ROW)).reshape(len(groups), -1)
+        existing = np.minimum(block, self.senders - 1)
+        bound = self._contribution_bound(own, self.bounds[existing])
+        bound, chosen, rest = _largest(np.where(block < self.senders, bound, np.float32(0.0)), count)
+        return np.take_along_axis(existing, chosen, axis=1), bound, np.maximum(rest_of_rows, rest)
 
-    def _most_between(self, groups: Bounds, blocks: Bounds) -> Array:
-        """float32 (g, k): what a vertex of a block sends to one of a group at most, of all channels together."""
-        square = groups.squared(blocks)
+    def _contribution_bound(self, groups: Bounds, blocks: Bounds) -> Array:
+        """Return an upper bound of area times R_d, summed over the channels, between any vertices, float32 (g, k)."""
+        square = groups.least_square(blocks)
         entry = np.maximum(square.view(np.uint32) >> np.uint32(shift()), np.uint32(self.first)) - np.uint32(self.first)
-        most = self._most[np.minimum(entry, np.uint32(len(self._most) - 1))] * blocks.area
-        most *= groups.face_away(blocks)
-        return most
+        bound = self._bound[np.minimum(entry, np.uint32(len(self._bound) - 1))] * blocks.area
+        bound *= groups.may_face_away(blocks)
+        return bound
 
 
 def _largest(values: Array, count: int) -> tuple[Array, Array, Array]:
-    """The largest (g, count) of each row, in falling order, which they are, and the largest (g,) of the others."""
+    """Return the largest values of each row (g, count) in falling order, their columns, and the next largest (g,)."""
     if count < values.shape[1]:
-        which = np.argpartition(-values, count, axis=1)
-        rest = np.take_along_axis(values, which[:, count : count + 1], axis=1)[:, 0]
-        which = which[:, :count]
+        column = np.argpartition(-values, count, axis=1)
+        rest = np.take_along_axis(values, column[:, count : count + 1], axis=1)[:, 0]
+        column = column[:, :count]
     else:
-        which, rest = np.broadcast_to(np.arange(values.shape[1]), values.shape), np.zeros(len(values), values.dtype)
-    found = np.take_along_axis(values, which, axis=1)
-    order = np.argsort(-found, axis=1, kind="stable")
-    return np.take_along_axis(found, order, axis=1), np.take_along_axis(which, order, axis=1), rest
+        column, rest = np.broadcast_to(np.arange(values.shape[1]), values.shape), np.zeros(len(values), values.dtype)
+    largest = np.take_along_axis(values, column, axis=1)
+    order = np.argsort(-largest, axis=1, kind="stable")
+    return np.take_along_axis(largest, order, axis=1), np.take_along_axis(column, order, axis=1), rest
 
 
-def _blocks(fans: Fans, which: Array, size: int) -> tuple[Array, Array]:
-    """Vertices in blocks of `size` at most, and where each block begins."""
-    chosen = np.flatnonzero(which)
-    if not len(chosen):
-        return chosen, chosen
-    spacing = np.sqrt(fans.area[chosen].mean())
-    order = point_tree(np.column_stack([fans.centre, _NORMALS * spacing * fans.normal])[chosen]).order
+def _in_blocks(fans: Fans, chosen: Array, size: int) -> tuple[Array, Array]:
+    """Return the vertices of a mask (V,) in an order of blocks of at most `size`, and where each block begins."""
+    vertices = np.flatnonzero(chosen)
+    if not len(vertices):
+        return vertices, vertices
+    spacing = np.sqrt(fans.area[vertices].mean())
+    order = point_tree(np.column_stack([fans.centre, _NORMAL_SCALE * spacing * fans.normal])[vertices]).order
     parts = 1
-    while parts * size < len(chosen):
+    while parts * size < len(vertices):
         parts *= 2
-    return chosen[order], len(chosen) * np.arange(parts) // parts
+    return vertices[order], len(vertices) * np.arange(parts) // parts
