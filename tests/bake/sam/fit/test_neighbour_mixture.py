@@ -72,21 +72,21 @@ def test_proportional_rows_have_equal_parts():
 
 
 def test_tints_make_uniform_light_exact_in_each_channel():
-    even, total = RNG.random((12, 3)) + 0.5, RNG.random((12, 3)) + 0.5
+    uniform, total = RNG.random((12, 3)) + 0.5, RNG.random((12, 3)) + 0.5
     sums = RNG.random((12, 20)) + 0.2
     mixture = line(sums, sums)
-    fit_tint(mixture, even, total)
-    fit_tint(mixture, even, total)  # the tint of before does not matter
-    np.testing.assert_allclose(mixture.apply(even), total, rtol=2e-3)  # float16
-    both = mixture.apply(np.stack([even, 2.0 * even], axis=1))
+    fit_tint(mixture, uniform, total)
+    fit_tint(mixture, uniform, total)  # the tint of before does not matter
+    np.testing.assert_allclose(mixture.apply(uniform), total, rtol=2e-3)  # float16
+    both = mixture.apply(np.stack([uniform, 2.0 * uniform], axis=1))
     np.testing.assert_allclose(both, np.stack([total, 2.0 * total], axis=1), rtol=2e-3)
 
 
 def test_empty_rows_are_in_no_mixture_and_have_none():
-    none, some = EVERY[EVERY % 3 == 0], EVERY[EVERY % 3 > 0]
+    none, used = EVERY[EVERY % 3 == 0], EVERY[EVERY % 3 > 0]
     sums = RNG.random((12, 20))
-    mixture = line(sums, sums, some)
-    assert not mixture.weight[none].any() and not np.isin(mixture.row[some], none).any()
+    mixture = line(sums, sums, used)
+    assert not mixture.weight[none].any() and not np.isin(mixture.row[used], none).any()
     assert not line(sums, sums, EVERY[:0]).weight.any()
 
 

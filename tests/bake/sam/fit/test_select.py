@@ -72,8 +72,8 @@ def test_second_rows_and_refits_lessen_the_error(gpu, thin, monkeypatch, constan
         sender_map = select_fit(gpu, mesh, PROFILE, 3)
         receivers = sender_map.weight[: len(K)].any(axis=(1, 2)).sum()
         assert len(sender_map.sender) == len(K) + -(-receivers // fit.RECEIVERS_PER_SECOND_ROW)
-        found = [M_back(sender_map, light, fan_areas(mesh)) for light in lights]
-        return np.square(np.array(found) - exact).sum()
+        received = [M_back(sender_map, light, fan_areas(mesh)) for light in lights]
+        return np.square(np.array(received) - exact).sum()
 
     whole = error()
     monkeypatch.setattr(fit, constant, off)
@@ -83,10 +83,10 @@ def test_second_rows_and_refits_lessen_the_error(gpu, thin, monkeypatch, constan
 def test_uniform_light_gives_the_sum_of_all_form_factors(gpu, thin):
     mesh, K = thin
     sender_map = select_fit(gpu, mesh, PROFILE, 3)
-    found = M_back(sender_map, np.ones(len(mesh.positions)), fan_areas(mesh))
+    total = M_back(sender_map, np.ones(len(mesh.positions)), fan_areas(mesh))
     exact = K.sum(axis=1)
-    assert np.sqrt(np.square(found - exact).sum() / np.square(exact).sum()) < 0.03
-    assert found.sum() == pytest.approx(exact.sum(), rel=0.02)
+    assert np.sqrt(np.square(total - exact).sum() / np.square(exact).sum()) < 0.03
+    assert total.sum() == pytest.approx(exact.sum(), rel=0.02)
 
 
 def test_senders_beyond_the_range_of_the_profile_are_ignored(gpu):
@@ -116,8 +116,9 @@ def test_the_error_of_nodes_is_corrected_in_the_total(gpu):
     """Nodes count as points at their centroids: a small ball would receive one percent too much without correction."""
     mesh, profile = sphere(6.0, 3000), MATERIALS["wholemilk"].profile
     x, n = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
-    some = np.arange(0, len(x), 97)
-    receiver, sender = np.nonzero((np.einsum("oid,od->oi", x - x[some, None], n[some]) < 0) & (n[some] @ n.T < 0))
-    exact = form_factors(gpu, mesh, profile, np.stack([some[receiver], sender], axis=1)).sum(axis=0)
-    found = M_back(select_fit(gpu, mesh, profile, 3), np.ones(len(x)), fan_areas(mesh))[some].sum(axis=0)
-    np.testing.assert_allclose(found, exact, rtol=0.006)
+    receivers = np.arange(0, len(x), 97)
+    is_below = np.einsum("oid,od->oi", x - x[receivers, None], n[receivers]) < 0
+    receiver, sender = np.nonzero(is_below & (n[receivers] @ n.T < 0))
+    exact = form_factors(gpu, mesh, profile, np.stack([receivers[receiver], sender], axis=1)).sum(axis=0)
+    total = M_back(select_fit(gpu, mesh, profile, 3), np.ones(len(x)), fan_areas(mesh))[receivers].sum(axis=0)
+    np.testing.assert_allclose(total, exact, rtol=0.006)

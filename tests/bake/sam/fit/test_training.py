@@ -6,10 +6,10 @@ import numpy as np
 
 from wgsss.bake.sam.fit.training import (
     COMPONENTS,
-    EVEN_WEIGHT,
     SKIES,
     SKY_WEIGHT,
     SUNS,
+    UNIFORM_WEIGHT,
     compressed,
     spiral,
     training_lights,
@@ -41,7 +41,7 @@ def test_suns_cast_shadows():
 def test_skies_and_uniform_light_reach_every_vertex():
     lights = training_lights(two_balls())
     assert lights.shape[0] == SUNS + SKIES + 1
-    np.testing.assert_allclose(lights[-1], EVEN_WEIGHT)
+    np.testing.assert_allclose(lights[-1], UNIFORM_WEIGHT)
     skies = lights[SUNS:-1] / SKY_WEIGHT
     assert skies.min() >= 0.0 and skies.max() <= 1.0 + 1e-6
     np.testing.assert_allclose(skies.mean(axis=0), 0.5, atol=0.02)  # half of every sky is above

@@ -65,13 +65,13 @@ def neighbour_mixture(
     count = min(NEAREST, len(rows))
     near = KDTree(place).query(place[: len(vertices)], k=np.arange(1, count + 1), workers=-1)[1]
 
-    def choose_rows(some: Array) -> None:
-        nearest = rows[near[some]]
-        part, _ = _mixture_parts(nearest, vertices[some], gather, response)
-        part[owner[nearest] == vertices[some, None]] = np.inf  # always take the vertex's own rows
+    def choose_rows(block: Array) -> None:
+        nearest = rows[near[block]]
+        part, _ = _mixture_parts(nearest, vertices[block], gather, response)
+        part[owner[nearest] == vertices[block, None]] = np.inf  # always take the vertex's own rows
         # Rounding makes rows that add as much comparable: of these, the nearest are taken, on every machine.
         column = np.sort(np.argsort(-part.round(2), axis=1, kind="stable")[:, :most], axis=1)
-        mixture.row[vertices[some], : column.shape[1]] = np.take_along_axis(nearest, column, axis=1)
+        mixture.row[vertices[block], : column.shape[1]] = np.take_along_axis(nearest, column, axis=1)
 
     in_blocks(choose_rows, np.arange(len(vertices)))
     solve_weights(mixture, vertices, gather, response)
@@ -82,22 +82,22 @@ def solve_weights(mixture: NeighbourMixture, vertices: Array, gather: Gather, re
     """Fit the weights of the mixtures of some vertices, whose rows are chosen. Arguments as in `neighbour_mixture`."""
     k = min(mixture.row.shape[1], len(vertices))
 
-    def solve(some: Array) -> None:
-        part, scale = _mixture_parts(mixture.row[some, :k], some, gather, response)
-        mixture.weight[some, :k] = scale * part
+    def solve(block: Array) -> None:
+        part, scale = _mixture_parts(mixture.row[block, :k], block, gather, response)
+        mixture.weight[block, :k] = scale * part
 
     in_blocks(solve, vertices)
 
 
-def fit_tint(mixture: NeighbourMixture, even: Array, total: Array) -> None:
+def fit_tint(mixture: NeighbourMixture, uniform: Array, total: Array) -> None:
     """Set the tints so that M_back under uniform light has the right colour.
 
     Args:
-        even: (R, 3), the sums of all rows under uniform light.
+        uniform: (R, 3), the sums of all rows under uniform light.
         total: (V, 3), the sums of all form factors of the vertices, which is exact M_back under uniform light.
     """
     mixture.tint[:] = 1.0
-    mixed = mixture.apply(even)
+    mixed = mixture.apply(uniform)
     mixture.tint[:] = np.clip(total / np.where(mixed > 0.0, mixed, 1.0), 0.0, _MAX_TINT)
 
 

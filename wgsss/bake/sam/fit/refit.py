@@ -55,17 +55,17 @@ def refit(
     step = transposed @ mixing.sum(axis=1)
     residual = response[vertices]
 
-    def subtract_mixtures(some: Array) -> None:
-        used, index = np.unique(read[some], return_inverse=True)
-        mixing_used = csr_array((mixing[some].data, index.ravel(), np.arange(len(some) + 1) * read.shape[1]))
-        residual[some] -= mixing_used @ gather_rows(sender[rows[used]], weight[rows[used]], light)
+    def subtract_mixtures(block: Array) -> None:
+        used, index = np.unique(read[block], return_inverse=True)
+        mixing_used = csr_array((mixing[block].data, index.ravel(), np.arange(len(block) + 1) * read.shape[1]))
+        residual[block] -= mixing_used @ gather_rows(sender[rows[used]], weight[rows[used]], light)
 
-    def scale_entries(some: Array) -> None:
-        row, cost = rows[some], step[some, None, None]
+    def scale_entries(block: Array) -> None:
+        row, cost = rows[block], step[block, None, None]
         entry = weight[row].sum(axis=2)[..., None] * light[sender[row]]
         gram = cost * (entry @ entry.transpose(0, 2, 1))
         gram += 1e-5 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(entry.shape[1], dtype=np.float32)
-        moment = gram.sum(axis=2, keepdims=True) + entry @ (transposed[some] @ residual)[..., None]
+        moment = gram.sum(axis=2, keepdims=True) + entry @ (transposed[block] @ residual)[..., None]
         factor = batched_nnls(gram, moment)
         weight[row] *= np.where(cost > 0.0, np.maximum(factor, _MIN_FACTOR), 1.0)
 

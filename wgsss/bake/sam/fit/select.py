@@ -55,8 +55,8 @@ def select_fit(gpu: Gpu, mesh: Mesh, profile: Profile, n: int) -> SenderMap:
     response, total = np.zeros((V, light.shape[1]), np.float32), np.zeros((V, 3), np.float32)
 
     def fit_first_rows(patches: ReceiverPatches) -> None:
-        for vertex, chosen, chosen_weight, exact, even in _pursuits(K, light, patches, n):
-            sender[vertex], weight[vertex], response[vertex], total[vertex] = chosen, chosen_weight, exact, even
+        for vertex, chosen, chosen_weight, exact, uniform in _pursuits(K, light, patches, n):
+            sender[vertex], weight[vertex], response[vertex], total[vertex] = chosen, chosen_weight, exact, uniform
 
     def fit_both_rows(patches: ReceiverPatches) -> None:
         for vertex, chosen, chosen_weight, _, _ in _pursuits(K, light, patches, 2 * n):
@@ -109,8 +109,8 @@ def _pursuits(K: PatchFormFactors, light: Array, patches: ReceiverPatches, n: in
         response = (k.reshape(B, 3 * P, C) @ light[reaching]).reshape(B, 3, P, -1)
         index, weight = omp(light[candidate], response, n)
         chosen = np.take_along_axis(candidate, index.reshape(B, -1), axis=1).reshape(index.shape)
-        is_receiver, even = receiver >= 0, k.sum(axis=3).transpose(0, 2, 1)
-        yield tuple(a[is_receiver] for a in (receiver, chosen, weight, response.sum(axis=1), even))
+        is_receiver, uniform = receiver >= 0, k.sum(axis=3).transpose(0, 2, 1)
+        yield tuple(a[is_receiver] for a in (receiver, chosen, weight, response.sum(axis=1), uniform))
 
 
 def _worst(receivers: Array, gather: Callable[[Array], Array], response: Array) -> Array:
@@ -123,8 +123,8 @@ def _worst(receivers: Array, gather: Callable[[Array], Array], response: Array) 
     """
     error = np.zeros(len(response))
 
-    def measure(some: Array) -> None:
-        error[some] = np.square(response[some] - gather(some)).sum(axis=1)
+    def measure(block: Array) -> None:
+        error[block] = np.square(response[block] - gather(block)).sum(axis=1)
 
     in_blocks(measure, receivers)
     order = np.argsort(-error[receivers], kind="stable")
@@ -139,9 +139,9 @@ def _correction(K: PatchFormFactors, total: Array) -> Array:
     Args:
         total: float32 (V, 3), the computed sums of form factors.
     """
-    some = np.random.default_rng(0).permutation(np.flatnonzero(total.any(axis=1)))[:_EXACT_SUMS]
-    computed, exact = total[some].sum(axis=0, dtype=np.float64), np.zeros(3)
-    for vertex in some:
+    sample = np.random.default_rng(0).permutation(np.flatnonzero(total.any(axis=1)))[:_EXACT_SUMS]
+    computed, exact = total[sample].sum(axis=0, dtype=np.float64), np.zeros(3)
+    for vertex in sample:
         exact += K(np.array([[vertex]]), np.arange(len(total))[None])[0, :, 0].sum(axis=1, dtype=np.float64)
     return np.where(computed > 0.0, exact / _divisor(computed), 1.0).astype(np.float32)
 
@@ -156,12 +156,12 @@ def _irradiances(senders: SenderTree, means: SmoothedMeans, lights: Array) -> Ar
     irradiance[:V] = lights
     levels, finest = V + senders.tree.levels, senders.tree.first[: senders.tree.levels[1]]
     for first in range(0, T, _LIGHTS_AT_ONCE):
-        some = slice(first, first + _LIGHTS_AT_ONCE)
-        sums = np.add.reduceat((lights[:, some] * senders.area[:V, None])[senders.tree.order], finest)
+        chunk = slice(first, first + _LIGHTS_AT_ONCE)
+        sums = np.add.reduceat((lights[:, chunk] * senders.area[:V, None])[senders.tree.order], finest)
         for a, b in pairwise(levels):
-            irradiance[a:b, some] = sums / _divisor(senders.area[a:b, None])
+            irradiance[a:b, chunk] = sums / _divisor(senders.area[a:b, None])
             sums = sums.reshape(-1, 4, sums.shape[1]).sum(axis=1) if b - a > 1 else sums
-        irradiance[end:-1, some] = means.apply(irradiance[V:end, some])
+        irradiance[end:-1, chunk] = means.apply(irradiance[V:end, chunk])
     return irradiance
 
 

@@ -20,7 +20,7 @@ SUNS = 160
 """number of directional lights, with shadows"""
 SKIES = 24
 """number of half skies, without shadows, so that places that no sun reaches are lit, too"""
-SKY_WEIGHT, EVEN_WEIGHT = 1.0, 3.5
+SKY_WEIGHT, UNIFORM_WEIGHT = 1.0, 3.5
 """weights of the errors under a sky and under uniform light, relative to a sun; uniform light sets the total energy"""
 COMPONENTS = 128
 """number of components that the lights are compressed to"""
@@ -43,7 +43,7 @@ def training_lights(mesh: Mesh) -> Array:
         is_visible = ~caster.blocked(x[lit], np.broadcast_to(w, (len(lit), 3)))
         light[lit] = cosine[lit] * is_visible
     lights[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + spiral(SKIES) @ n.T)
-    lights[-1] = EVEN_WEIGHT
+    lights[-1] = UNIFORM_WEIGHT
     return lights
 
 
@@ -59,8 +59,8 @@ def compressed(lights: Array, area: Array) -> Array:
     """
     gram = np.zeros((len(lights), len(lights)))
     for first in range(0, len(area), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        gram += (lights[:, some] * area[some]) @ lights[:, some].T
+        chunk = slice(first, first + _AT_ONCE)
+        gram += (lights[:, chunk] * area[chunk]) @ lights[:, chunk].T
     _, directions = np.linalg.eigh(gram)
     basis = directions[:, ::-1][:, :COMPONENTS].astype(np.float32)
     return lights.T @ basis
