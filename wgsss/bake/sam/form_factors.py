@@ -98,7 +98,7 @@ def form_factors(gpu: Gpu, mesh: Mesh, profile: Profile, pairs: Array) -> Array:
 
 
 class FormFactors:
-    """Integrates form factors of one mesh and profile, for lists of pairs."""
+    """Integrates form factors K_oi (eq. 11) between vertices of one mesh, for one profile."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile) -> None:
         self.gpu, self.fans = gpu, Fans(mesh)

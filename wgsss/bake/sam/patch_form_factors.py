@@ -37,7 +37,7 @@ _AT_ONCE = 1 << 16  # vertices whose neighbours are searched for together
 
 
 class PatchFormFactors:
-    """Form factors K_oi of one mesh, its tree of senders and a profile."""
+    """Computes form factors K_oi (eq. 11) from vertices and nodes of a sender tree to patches of vertices."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, profile: Profile, senders: SenderTree) -> None:
         self.senders = senders

@@ -32,7 +32,7 @@ _BATCH_SIZE = 4_000_000  # numbers that the arrays of one batch hold, about
 
 @dataclass(frozen=True, eq=False)
 class ReceiverPatches:
-    """Patches of some vertices of a mesh, by nodes of the tree of senders. A patch is the chosen vertices of a node."""
+    """Patches of neighbouring receivers. A patch is the chosen vertices below one node of the sender tree."""
 
     node: Array
     """int64 (p,): the nodes of the patches, counted from the first node of the tree"""

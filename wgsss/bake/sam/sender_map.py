@@ -66,7 +66,7 @@ class NeighbourMixture:
     """float16 (V, 3), without unit: a factor for each colour channel"""
 
     def apply(self, gathered: Array) -> Array:
-        """Return the mixtures (V, ..., 3) of the sums of all rows (R, ..., 3)."""
+        """Return M_back (V, ..., 3) from `gathered` (R, ..., 3), the sums of all rows of entries."""
         weight, tint = self.weight.astype(gathered.dtype), self.tint.astype(gathered.dtype)
         return np.einsum("vk,vk...c,vc->v...c", weight, gathered[self.row], tint)
 

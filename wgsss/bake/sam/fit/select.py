@@ -166,5 +166,5 @@ def _irradiances(senders: SenderTree, means: SmoothedMeans, lights: Array) -> Ar
 
 
 def _divisor(values: Array) -> Array:
-    """Return the values, and 1 for those whose inverse float32 cannot represent."""
+    """Return the values, with 1 in place of those that are too small to divide by in float32."""
     return np.where(values > 1e-30, values, 1.0)

@@ -108,7 +108,10 @@ class SenderSearch:
             yield order[edges[groups[0]] : edges[first]], np.where(sender >= 0, order[sender], -1)
 
     def _is_receiver(self, groups: Array) -> Array:
-        """Return which of GROUP places of each group have a receiver, bool (g, GROUP): blocks may be smaller."""
+        """Return which of the GROUP places of each group hold a receiver, bool (g, GROUP).
+
+        A group is a block of vertices, which may have fewer than GROUP.
+        """
         return np.asarray(np.arange(self.group) < np.diff(self.blocks.edges)[groups, None])
 
     def _search(self, groups: Array, candidates: int, passes: int) -> Array:
