@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError
-from wgsss.scene.files.gltf.compression import decoded_primitive
+from wgsss.scene.files.gltf.compression import DRACO, decode_primitive, missing
 from wgsss.scene.files.gltf.document import SHAPES, Document, as_floats
 from wgsss.scene.files.gltf.fields import Item
 from wgsss.scene.files.gltf.notes import Notes
@@ -28,9 +28,19 @@ class Attributes:
         self._accessors = Item((primitive.item("attributes") or Item({})).values, primitive.where)
         self._decoded: dict[str, Array] = {}
         self._faces: Array | None = None
-        packed = decoded_primitive(document, primitive)
+        packed = primitive.extension(DRACO)
         if packed is not None:
-            self._decoded, self._faces = packed
+            self._decode(packed)
+
+    def _decode(self, packed: Item) -> None:
+        """Decode what Draco compresses. Without the decoder, leave it to the accessors if these have data, too."""
+        if error := missing(DRACO):
+            position = self._document.at("accessor", self._accessors.get("POSITION"), self.where)
+            if not position.has("bufferView"):
+                raise self._primitive.error(error)
+            return
+        data, _ = self._document.view(packed.get("bufferView"), packed.where)
+        self._decoded, self._faces = decode_primitive(packed, data)
 
     @property
     def names(self) -> list[str]:

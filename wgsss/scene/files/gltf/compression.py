@@ -1,36 +1,33 @@
-"""Compressed meshes and buffer views: KHR_draco_mesh_compression, EXT_ and KHR_meshopt_compression.
+"""Decoders of compressed glTF data: KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_meshopt_compression.
 
-They are decoded by DracoPy and meshopt, which need not be installed: without them the uncompressed data are read that
-some files have beside the compressed ones.
+The packages DracoPy and meshopt decode them. Neither has to be installed: some files also hold the uncompressed data,
+which are then read instead.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.scene.files.gltf.fields import Item, plain
 
-if TYPE_CHECKING:
-    from wgsss.scene.files.gltf.document import Document
-
 Array = npt.NDArray[Any]
 
 DRACO = "KHR_draco_mesh_compression"
 MESHOPT = ("KHR_meshopt_compression", "EXT_meshopt_compression")
 PACKAGES = {DRACO: "DracoPy", **dict.fromkeys(MESHOPT, "meshopt")}
-"""what decodes an extension"""
+"""the package that decodes each extension"""
 
-# A block of 256 rows takes a fourth of a byte or more of each of their bytes, so no valid data grow by more than this.
+# A block of 256 rows takes at least a quarter of a byte for each byte of a row: valid data grow by no more than this.
 _MESHOPT_GROWTH = 1024
 
 
 def missing(extension: str) -> str:
-    """What to say where the package is not installed that decodes an extension; "" where it is."""
+    """Return an error text if the package that decodes an extension is not installed, else ""."""
     package = PACKAGES.get(extension)
     if package is None or importlib.util.find_spec(package) is not None:
         return ""
@@ -44,33 +41,14 @@ def _loaded(package: str, packed: Item) -> Any:
         raise packed.error(f"the package {package} cannot be loaded ({plain(str(error))})") from None
 
 
-def decoded_view(document: Document, view: Item) -> memoryview | None:
-    """The bytes of a buffer view that meshopt compresses; None where its own are to be read."""
-    for name in MESHOPT:
-        packed = view.extension(name)
-        if packed is None:
-            continue
-        if missing(name):
-            if _has_data(document, view):
-                return None
-            raise view.error(missing(name))
-        return _unpack(document, view, packed)
-    return None
+def decode_view(view: Item, packed: Item, data: memoryview) -> memoryview:
+    """Decode a buffer view from the `data` that its meshopt extension `packed` refers to.
 
-
-def _has_data(document: Document, view: Item) -> bool:
-    """Whether the buffer of a view holds the view's uncompressed data, and does not merely stand for them."""
-    buffer = document.at("buffer", view.get("buffer"), view.where)
-    if any((mark := buffer.extension(name)) is not None and mark.flag("fallback", False) for name in MESHOPT):
-        return False
-    return buffer.has("uri") or view.get("buffer") == 0
-
-
-def _unpack(document: Document, view: Item, packed: Item) -> memoryview:
+    Raises InputError if the data are damaged, or are not as long as the view says.
+    """
     mode = packed.text("mode", choices=("ATTRIBUTES", "TRIANGLES", "INDICES"))
     kind = packed.text("filter", "NONE", choices=("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"))
     count, stride, length = packed.whole("count"), packed.whole("byteStride", low=1), view.whole("byteLength")
-    data = document.span(packed)
     if count * stride != length:
         raise packed.error(f"its {count} rows of {stride} bytes are not the {length} bytes of {view.where}")
     if length > _MESHOPT_GROWTH * (len(data) + 1):
@@ -83,19 +61,12 @@ def _unpack(document: Document, view: Item, packed: Item) -> memoryview:
     return memoryview(np.ascontiguousarray(found).tobytes())
 
 
-def decoded_primitive(document: Document, primitive: Item) -> tuple[dict[str, Array], Array] | None:
-    """The attributes (V, C) as stored, and faces (F, 3), of a primitive that Draco compresses; None where its
-    accessors are to be read."""
-    packed = primitive.extension(DRACO)
-    if packed is None:
-        return None
-    if missing(DRACO):
-        attributes = primitive.item("attributes") or Item({})
-        position = document.at("accessor", attributes.get("POSITION"), primitive.where)
-        if position.has("bufferView"):
-            return None
-        raise primitive.error(missing(DRACO))
-    data, _ = document.view(packed.get("bufferView"), packed.where)
+def decode_primitive(packed: Item, data: memoryview) -> tuple[dict[str, Array], Array]:
+    """Decode a primitive from the `data` that its Draco extension `packed` refers to.
+
+    Returns the attributes by name, (V, C) as stored, and the faces, int64 (F, 3). Raises InputError if the data are
+    damaged, or if an attribute is not in them.
+    """
     names = packed.item("attributes") or Item({}, packed.where)
     package = _loaded("DracoPy", packed)
     try:

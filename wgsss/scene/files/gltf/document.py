@@ -90,9 +90,30 @@ class Document:
         number = int(index)
         if number not in self._views:
             stride = item.whole("byteStride") if item.has("byteStride") else None
-            decoded = compression.decoded_view(self, item)
-            self._views[number] = (self.span(item) if decoded is None else decoded, stride)
+            self._views[number] = (self._view_bytes(item), stride)
         return self._views[number]
+
+    def _view_bytes(self, view: Item) -> memoryview:
+        """Return the bytes of a buffer view, decoded if meshopt compresses them and is installed."""
+        for name in compression.MESHOPT:
+            packed = view.extension(name)
+            if packed is None:
+                continue
+            error = compression.missing(name)
+            if not error:
+                return compression.decode_view(view, packed, self.span(packed))
+            if not self._has_uncompressed(view):
+                raise view.error(error)
+            break
+        return self.span(view)
+
+    def _has_uncompressed(self, view: Item) -> bool:
+        """Return whether the buffer of a compressed view also holds the uncompressed data."""
+        buffer = self.at("buffer", view.get("buffer"), view.where)
+        marks = (buffer.extension(name) for name in compression.MESHOPT)
+        if any(mark is not None and mark.flag("fallback", False) for mark in marks):
+            return False
+        return buffer.has("uri") or view.get("buffer") == 0
 
     def span(self, item: Item) -> memoryview:
         """The bytes of a buffer that an object names by buffer, byteOffset and byteLength."""
