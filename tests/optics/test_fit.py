@@ -151,7 +151,7 @@ def test_no_gaussians_is_told(skin, fit):
 
 @pytest.mark.parametrize(("k", "percent"), [(2, 9.9), (3, 3.7), (4, 1.53), (6, 0.33)])
 def test_worst_error_of_the_measured_materials(k, percent):
-    worst = max(fit_error(profile, profile.gaussians(k)).max() for profile in MEASURED.values())
+    worst = max(fit_error(profile, fit_gaussians(profile, k)).max() for profile in MEASURED.values())
     assert 0.9 * percent < 100 * worst <= percent
 
 

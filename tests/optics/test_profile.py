@@ -21,6 +21,7 @@ from wgsss.optics import (
     Profile,
     SumOfGaussians,
     Tabulated,
+    fit_gaussians,
     fit_shared_gaussians,
 )
 
@@ -75,7 +76,7 @@ MODELS: dict[str, Callable[[list[int], float], Profile]] = {
         dipole(turn, size).total, dipole(turn, size).mean_free_path
     ),
     "Borshukov-Lewis": lambda turn, size: BorshukovLewis.fit(dipole(turn, size)),
-    "Gaussians": lambda turn, size: dipole(turn, size).gaussians(3),
+    "Gaussians": lambda turn, size: fit_gaussians(dipole(turn, size), 3),
     "shared Gaussians": lambda turn, size: fit_shared_gaussians(dipole(turn, size), 3),
     "table": table,
     "photons": photons,

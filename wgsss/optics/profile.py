@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wgsss.errors import InputError
-
-if TYPE_CHECKING:
-    from wgsss.optics.gaussians import SumOfGaussians
 
 Array = NDArray[np.float64]
 
@@ -95,12 +92,6 @@ class Profile(ABC):
         span = np.log(_FARTHEST / _NEAREST)
         y = _NEAREST * np.exp(span * t[:, *(None,) * x.ndim])
         return np.tensordot(2.0 * span * weights, self.reflectance(np.hypot(x, y)) * y[..., None], axes=1)
-
-    def gaussians(self, k: int = 6) -> SumOfGaussians:
-        """The sum of `k` Gaussians per channel nearest to this profile (003 eq. 2); see `fit_gaussians`."""
-        from wgsss.optics.fit import fit_gaussians
-
-        return fit_gaussians(self, k)
 
     def table(self, n: int = 256) -> tuple[Array, Array]:
         """R at `n` distances, equally spaced in log r: r (n,) in mm and R (n, 3), for lookups and plots.

@@ -21,6 +21,7 @@ from wgsss.optics import (
     NormalizedDiffusion,
     Profile,
     fit_error,
+    fit_gaussians,
 )
 from wgsss.scene import Material
 
@@ -79,7 +80,7 @@ def _multipole(case: Case) -> Profile:
 
 
 def _gaussians(case: Case) -> Profile:
-    return case.material.profile.gaussians(case.k)
+    return fit_gaussians(case.material.profile, case.k)
 
 
 def _table(case: Case) -> Profile:
@@ -165,7 +166,7 @@ def described(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
     R = profile.reflectance(r)
     if not np.all(np.isfinite(R)):
         raise InputError(f"R of the model '{name}' is infinite at r = {r[~np.isfinite(R).all(axis=-1)][0]:g} mm")
-    fit = profile.gaussians(k)
+    fit = fit_gaussians(profile, k)
     found: dict[str, Any] = {"model": name, "r_mm": r.tolist(), "R": R.tolist()}
     if profile.total_transmittance.any():
         found |= {"T": profile.transmittance(r).tolist(), "total_T": profile.total_transmittance.tolist()}
