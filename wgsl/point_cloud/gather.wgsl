@@ -7,6 +7,7 @@
 
 import package::mesh::{ObjectUniforms, color_before, color_after};
 import package::point_cloud::tree::{Entering};
+import package::profile_table::{entries_of};
 import package::screen::{position_of_pixel};
 import package::units::{Number, Position, Direction};
 
@@ -21,7 +22,6 @@ override FIRST: u32 = 1u; // 0 where another object has been written: what this 
 
 // Of the length of a normal.
 const ROUNDING: Number = 1e-6;
-const SHIFT: u32 = 15u;      // bits of a squared distance between entries of the table: 256 for each time it doubles
 const TILE: u32 = 32u;       // pixels of a workgroup, a side
 const BLOCK: u32 = 4u;       // of an invocation
 const NOWHERE: Number = 1e9; // mm: too far for light to get there
@@ -101,8 +101,7 @@ fn unpacked(entry: u32) -> vec3f {
 
 // R_d at the roots of `squared`, in the table's unit.
 fn reflectances(squared: vec4f) -> mat4x3f {
-    let wanted = max(bitcast<vec4u>(squared) >> vec4u(SHIFT), vec4u(params.first_entry)) - params.first_entry;
-    let entry = min(wanted, vec4u(arrayLength(&table) - 1u));
+    let entry = min(entries_of(squared, params.first_entry), vec4u(arrayLength(&table) - 1u));
     return mat4x3f(unpacked(entry.x), unpacked(entry.y), unpacked(entry.z), unpacked(entry.w));
 }
 

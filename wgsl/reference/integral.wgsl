@@ -3,11 +3,11 @@
 // Samples come in blocks; each workgroup has a list of those that lie within the profile's range of its receivers. Each
 // block is summed before it is added, since a sum of many small numbers would lose them to rounding.
 
+import package::profile_table::{entry_of, fraction_of};
 import package::units::{Area, Irradiance, Number, Position, Direction};
 
 const LANES: u32 = 64u;  // receivers of a workgroup
 const BLOCK: u32 = 256u; // samples
-const SHIFT: u32 = 15u;  // bits of a squared distance between the entries of the kernel: 256 for each time it doubles
 
 struct Params {
     first_entry: u32, // of the kernel, as the leading bits of the squared distance
@@ -48,10 +48,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         for (var i = 0u; i < BLOCK; i++) {
             let sample = samples[blocks[j] * BLOCK + i];
             let d = sample.position - receiver.position;
-            let bits = bitcast<u32>(dot(d, d));
-            let wanted = max(bits >> SHIFT, params.first_entry) - params.first_entry;
+            let squared = dot(d, d);
+            let wanted = entry_of(squared, params.first_entry);
             let entry = min(wanted, last);
-            let between = f32(bits & ((1u << SHIFT) - 1u)) / f32(1u << SHIFT);
+            let between = fraction_of(squared);
             let opposed = dot(sample.normal, receiver.normal) < 0.0;
             let is_back = opposed && dot(d, receiver.normal) < 0.0;
             let at = entry + select(0u, last + 2u, opposed);

@@ -3,9 +3,8 @@
 // Each point stands for a part of a fan and lies at its centroid. The mean squared distance between two parts is the
 // squared distance of their points plus the extents of both; R_d is evaluated there.
 
+import package::profile_table::{at_least_first, entry_of, fraction_of};
 import package::units::{Area, Number, Position};
-
-const SHIFT: u32 = 15u; // trailing bits of a squared distance that the table ignores: 256 entries for each doubling
 
 struct Params {
     first_entry: u32, // leading bits of the squared distance of the table's first entry
@@ -33,10 +32,9 @@ struct Term {
 
 // R_d at a squared distance, by linear interpolation in the table.
 fn reflectance(squared: Area) -> vec3f {
-    let bits = max(bitcast<u32>(squared), params.first_entry << SHIFT);
-    let entry = min((bits >> SHIFT) - params.first_entry, arrayLength(&table) - 2u);
-    let between = f32(bits & ((1u << SHIFT) - 1u)) / f32(1u << SHIFT);
-    return mix(table[entry].rgb, table[entry + 1u].rgb, between);
+    let inside = at_least_first(squared, params.first_entry);
+    let entry = min(entry_of(inside, params.first_entry), arrayLength(&table) - 2u);
+    return mix(table[entry].rgb, table[entry + 1u].rgb, fraction_of(inside));
 }
 
 @compute @workgroup_size(64)

@@ -2,7 +2,7 @@
 // small enough for their distance (Barnes & Hut 1986), and over the vertices below those that never are.
 
 import package::sam::place::{Place};
-import package::sam::profile::{log_entry};
+import package::profile_table::{log_entry};
 import package::units::{Number, Area};
 
 struct Params {

@@ -5,11 +5,11 @@
 // It stops where this bound is below the smallest contribution that its receivers have found. Each invocation serves
 // four receivers, as one vec4f: on a CPU device four take no longer than one.
 
+import package::profile_table::{entry_of};
 import package::units::{Area, Direction, Number, Position};
 
 const GROUP: u32 = 32u;         // largest number of receivers in a group, and of senders in a block
 const PER_INVOCATION: u32 = 4u; // receivers
-const SHIFT: u32 = 15u;         // trailing bits of a float that the tables ignore
 // Loop turns after which an invocation stops; the next dispatch goes on. lavapipe ends loops after 65,535 turns, which
 // it counts over nested loops and over the eight invocations that run in step.
 const TURNS: u32 = 6000u;
@@ -64,14 +64,12 @@ struct Entry {
 
 // R_d, summed over the channels, 1/mm^2.
 fn reflectance(squared: Area) -> Number {
-    let entry = max(bitcast<u32>(squared) >> SHIFT, params.first_entry) - params.first_entry;
-    return tables[min(entry, params.reflectances - 1u)];
+    return tables[min(entry_of(squared, params.first_entry), params.reflectances - 1u)];
 }
 
 // The squared distance beyond which R_d is smaller than R.
 fn reach(R: Number) -> Area {
-    let entry = max(bitcast<u32>(R) >> SHIFT, params.first_reach) - params.first_reach;
-    return tables[min(params.reflectances + entry, arrayLength(&tables) - 1u)];
+    return tables[min(params.reflectances + entry_of(R, params.first_reach), arrayLength(&tables) - 1u)];
 }
 
 // Insert a sender into the sorted entries of a receiver, which end before `end`. The last one drops out.

@@ -3,7 +3,7 @@
 
 import package::sam::entries::{Entry};
 import package::sam::place::{Place};
-import package::sam::profile::{log_entry};
+import package::profile_table::{log_entry};
 import package::units::{Number, Area};
 
 struct Params {

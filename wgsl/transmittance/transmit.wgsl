@@ -5,6 +5,7 @@ import package::units::{Length, Number, Position, Direction, Irradiance};
 import package::mesh::{ObjectUniforms};
 import package::light::{Light, ShadowView, Incident, incident, layer_towards, POINT};
 import package::rho_dt::{rho_dt};
+import package::profile_table::{root_entry};
 import package::screen::{position_of_pixel};
 import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
@@ -41,7 +42,7 @@ const SHRINK_TEXELS: Number = 2.0;
 
 fn transmittance(d: Length) -> vec3f {
     let last = arrayLength(&through) - 1u;
-    let s = sqrt(clamp(d / params.reach, 0.0, 1.0)) * f32(last);
+    let s = root_entry(d, params.reach, last);
     let i = min(u32(s), last - 1u);
     return mix(through[i], through[i + 1u], s - f32(i));
 }

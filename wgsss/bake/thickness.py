@@ -18,6 +18,7 @@ import numpy.typing as npt
 from wgsss.bake import rays
 from wgsss.cache import cached
 from wgsss.optics import Profile
+from wgsss.optics.lookup import geometric
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -76,7 +77,7 @@ def falloff(profile: Profile, d: Array) -> Array:
 def table(profile: Profile) -> tuple[Array, Array]:
     """The falloff (n, 3) at distances (n,), mm, up to where all but BEYOND of the light has left."""
     farthest = max(float(profile.range(BEYOND).max()), 1e-6)
-    distances = np.geomspace(_NEAREST * farthest, farthest, _ENTRIES)
+    distances = geometric(_NEAREST * farthest, farthest, _ENTRIES)
     return distances, falloff(profile, distances)
 
 

@@ -23,6 +23,7 @@ from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
 from wgsss.optics import Profile
+from wgsss.optics.lookup import interval_middles, leading_bits
 from wgsss.scene import Material
 from wgsss.stage import Body, Stage
 
@@ -183,7 +184,7 @@ class Kernel:
     @property
     def first(self) -> int:
         """The leading bits of the first entry's squared distance."""
-        return int(_leading(self.r[:1])[0])
+        return int(leading_bits(np.square(self.r[0])))
 
     @property
     def unit(self) -> float:
@@ -218,10 +219,8 @@ def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
 
 def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     far = max(min(size, float(profile.range(_BEYOND).max())), 2.0 * blunt)
-    first, last = _leading(np.array([_CLOSEST * blunt, far]))
-    bits = np.arange(first, last + 2, dtype=np.uint32) << np.uint32(_shift())
-    edges = bits.view(np.float32).astype(np.float64)
-    r = np.sqrt(0.5 * (edges[:-1] + edges[1:]))
+    first, last = leading_bits(np.square([_CLOSEST * blunt, far])).tolist()
+    r = np.sqrt(interval_middles(first, last + 1))
 
     def blunted(r: Array) -> Array:
         return profile.reflectance(np.where(r < blunt, (np.square(r) + blunt**2) / (2.0 * blunt), r))
@@ -232,15 +231,6 @@ def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     R = blunted(r)
     R[-1] = 0.0
     return Kernel(r, R, profile.total * profile.enclosed(blunt) - kept)
-
-
-def _shift() -> int:
-    return wgsl.load(_GATHER).constants["SHIFT"]
-
-
-def _leading(r: Array) -> Array:
-    """The leading bits of squared distances, by which the table is looked up."""
-    return np.square(r).astype(np.float32).view(np.uint32) >> np.uint32(_shift())
 
 
 @dataclass(frozen=True, eq=False)

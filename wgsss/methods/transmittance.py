@@ -36,6 +36,7 @@ from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.optics import Profile
+from wgsss.optics.lookup import root_spaced
 from wgsss.stage import Body, Stage
 
 Array = NDArray[np.float64]
@@ -129,7 +130,7 @@ def table(profile: Profile) -> tuple[Array, Array]:
     farther than d from where light enters.
     """
     reach = float(profile.range(_FAINTEST).max()) or 1.0
-    thickness = reach * np.square(np.linspace(0.0, 1.0, _ENTRIES))
+    thickness = root_spaced(reach, _ENTRIES)
     through = profile.beyond(thickness)
     through[-1] = 0.0
     return thickness, through

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import wgsl
 from wgsss.optics import Profile
+from wgsss.optics.lookup import interval_starts, leading_bits
 
 Array = npt.NDArray[Any]
 
@@ -43,15 +43,9 @@ class Kernel:
 
 def make_kernel(profile: Profile, spacing: float, farthest: float) -> Kernel:
     """The kernel of a profile for samples `spacing` mm apart on a body of `farthest` mm across."""
-    shift = wgsl.load("reference/integral").constants["SHIFT"]
     reach = max(min(float(profile.range(NEGLIGIBLE).max()), farthest), spacing)
-
-    def bits(r: float) -> int:
-        return int(np.float32(r * r).view(np.uint32)) >> shift
-
-    first, last = bits(_CLOSEST * spacing), bits(reach) + 1
-    squares = (np.arange(first, last + 1, dtype=np.uint32) << shift).view(np.float32).astype(np.float64)
-    r = np.sqrt(squares)
+    first, last = leading_bits(np.square([_CLOSEST * spacing, reach])).tolist()
+    r = np.sqrt(interval_starts(first, last + 2))
     table = np.zeros((2, len(r), 4))
     table[:, :, :3] = _blurred(profile, r, spacing), profile.reflectance(r)
     table[:, -1] = 0.0

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import wgsl
 from wgsss.bake.sam.fan_quadrature import FanPoints, Fans
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.optics import Profile
+from wgsss.optics.lookup import interval_starts, leading_bits
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -54,18 +54,7 @@ class Reflectance:
     @property
     def squares(self) -> Array:
         """The squared distances of the rows, float64 (k,), mm^2."""
-        return squares(self.first, self.first + len(self.R))
-
-
-def squares(first: int, end: int) -> Array:
-    """Return the squared distances (end - first,), mm^2, whose leading bits count up from `first`."""
-    bits = np.arange(first, end, dtype=np.uint32) << np.uint32(shift())
-    return bits.view(np.float32).astype(np.float64)
-
-
-def shift() -> int:
-    """Return how many trailing bits of a float32 squared distance the tables ignore, as the shader has it."""
-    return wgsl.load(_MODULE).constants["SHIFT"]
+        return interval_starts(self.first, self.first + len(self.R))
 
 
 def reflectance(profile: Profile, farthest: float) -> Reflectance:
@@ -75,8 +64,8 @@ def reflectance(profile: Profile, farthest: float) -> Reflectance:
     """
     lit = profile.total > 0.0
     nearest = 1e-3 * float(profile.range(0.5)[lit].min()) if lit.any() else 1.0
-    first, last = (int(np.float32(r * r).view(np.uint32)) >> shift() for r in (nearest, max(farthest, 2.0 * nearest)))
-    q = squares(first, last + 2)
+    first, last = leading_bits(np.square([nearest, max(farthest, 2.0 * nearest)])).tolist()
+    q = interval_starts(first, last + 2)
     R = profile.reflectance(np.sqrt(q))
     u = np.log(q)
     slope = np.gradient(R, u, axis=0)

@@ -18,6 +18,7 @@ from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.sender_tree import SenderTree
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
+from wgsss.optics.lookup import interval_middles, leading_bits
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -31,7 +32,7 @@ IGNORED_SHARE = 5e-4
 """share of the light that leaves a plane beyond the distance at which senders are ignored"""
 _TABLE_SHARE = 1e-5  # share of it that leaves beyond the end of the table, where R_d counts as 0
 _OPENED_SHARE = 2e-3  # of the total of R_d: nodes that contribute more may be replaced by their children
-_SHIFT = 16  # trailing bits of a float32 squared distance that the table ignores: 128 entries for each doubling
+_SHIFT = 16  # for leading_bits: 128 entries for each doubling of the squared distance, half as many as in other tables
 _FIRST_DISTANCE = 1e-3  # of the table, as a share of the distance at which senders are ignored
 _AT_ONCE = 1 << 16  # vertices whose neighbours are searched for together
 
@@ -46,10 +47,8 @@ class PatchFormFactors:
         self.opened = _OPENED_SHARE * float(profile.total.max())
         """nodes that contribute more than this, without unit, may be replaced by their children"""
         ends_mm = np.array([_FIRST_DISTANCE * self.farthest, profile.range(_TABLE_SHARE).max()], np.float32)
-        ends = np.square(ends_mm).view(np.int32) >> _SHIFT
-        self._first, last = int(ends[0]), int(ends[1])
-        middles = (np.arange(self._first, last + 1, dtype=np.int32) << _SHIFT) + (1 << (_SHIFT - 1))
-        R = profile.reflectance(np.sqrt(middles.view(np.float32).astype(np.float64))).astype(np.float32)
+        self._first, last = leading_bits(np.square(ends_mm), _SHIFT).tolist()
+        R = profile.reflectance(np.sqrt(interval_middles(self._first, last + 1, _SHIFT))).astype(np.float32)
         self._R = np.append(R.T, np.zeros((3, 1), np.float32), axis=1)  # 0 beyond the end
 
         pairs = near_pairs(mesh)
@@ -112,7 +111,7 @@ class PatchFormFactors:
 
     def _entry(self, square: Array) -> Array:
         """Return the entries of the table, unclamped, for squared distances, float32, mm^2."""
-        return (square.view(np.int32) >> np.int32(_SHIFT)) - np.int32(self._first)
+        return leading_bits(square, _SHIFT) - np.int32(self._first)
 
 
 def near_pairs(mesh: Mesh) -> Array:

@@ -19,13 +19,12 @@ from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas, one_ring
 from wgsss.graph import Graph
 from wgsss.methods.sam.upload import Plan, over_nodes
-from wgsss.optics import Profile
+from wgsss.optics.lookup import log_table
 from wgsss.scene import Mesh
 from wgsss.stage import Body
 
 Array = npt.NDArray[Any]
 
-_LEAST = 1e-36  # 1/mm^2: R_d may underflow, the logarithm of its table must not
 _TABLE = 1024
 _NEIGHBOURS = 6  # of a sample
 _NEAREST, _FARTHEST = 1e-4, 4.0  # of the table, in diagonals of the mesh: 0.1 % apart or less where R_d counts
@@ -56,7 +55,8 @@ def deforming(body: Body, plan: Plan) -> Deforming:
         gpu, mesh = body.stage.gpu, body.rest.mesh
         layout = wgsl.load("sam/fans").layout("array<Place>")
         starts, corners = _triangles(mesh, plan.entries)
-        low, steps, table = log_table(body.material.profile, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
+        diagonal = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+        low, steps, table = log_table(body.material.profile, _NEAREST * diagonal, _FARTHEST * diagonal, _TABLE)
         return Deforming(
             gpu.buffer(layout.pack(places_at_rest(mesh, plan.entries))),
             gpu.buffer(starts.astype(np.uint32)),
@@ -85,15 +85,6 @@ def _neighbours(mesh: Mesh, entries: SenderMap) -> Array:
         beside = (near != np.arange(len(x))[:, None]) & (np.einsum("sd,skd->sk", n, n[near]) > 0.0)
         start, found = np.append(0, np.cumsum(beside.sum(axis=1))), near[beside]
     return np.concatenate([start + len(start), found]).astype(np.uint32)
-
-
-def log_table(profile: Profile, diagonal: float) -> tuple[float, float, Array]:
-    """log2 of R_d (n, 4; the last column is 0), evenly over log2 of squared distances: the first, the steps to one."""
-    low, high = 2.0 * np.log2([_NEAREST * diagonal, _FARTHEST * diagonal])
-    R = profile.reflectance(np.exp2(0.5 * np.linspace(low, high, _TABLE)))
-    table = np.zeros((_TABLE, 4))
-    table[:, :3] = np.log2(np.maximum(R, _LEAST))
-    return float(low), (_TABLE - 1) / float(high - low), table
 
 
 def places_at_rest(mesh: Mesh, entries: SenderMap) -> dict[str, Array]:

@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.sam.fan_quadrature import Fans
-from wgsss.bake.sam.form_factors import Reflectance, shift, squares
+from wgsss.bake.sam.form_factors import Reflectance
 from wgsss.bake.sam.point_tree import point_tree
+from wgsss.optics.lookup import interval_starts, leading_bits
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -133,10 +134,10 @@ class Blocks:
         self.total = np.append(total, 0.0).astype(np.float32)
         """float32 (k,), 1/mm^2: R_d, summed over the channels, over the squared distance; the last is 0"""
         self._bound = np.maximum.accumulate(self.total[::-1])[::-1]  # of R_d at this distance or any larger one
-        least, largest = (int(np.float32(v).view(np.uint32)) >> shift() for v in (self._bound[-2], self._bound[0]))
+        least, largest = leading_bits(self._bound[[-2, 0]]).tolist()
         self.first_reach = max(least, 1)
         """the leading bits of the first value of R_d of `reach`"""
-        levels = squares(self.first_reach, max(largest, self.first_reach) + 1)
+        levels = interval_starts(self.first_reach, max(largest, self.first_reach) + 1)
         ends = np.append(R.squares, np.inf)
         self.reach = ends[np.searchsorted(-self._bound, -levels, side="right")].astype(np.float32)
         """float32 (m,), mm^2: the inverse of `total`, over the leading bits of R_d: the squared distance beyond which
@@ -164,8 +165,8 @@ class Blocks:
     def _contribution_bound(self, groups: Bounds, blocks: Bounds) -> Array:
         """Return an upper bound of area times R_d, summed over the channels, between any vertices, float32 (g, k)."""
         square = groups.least_square(blocks)
-        entry = np.maximum(square.view(np.uint32) >> np.uint32(shift()), np.uint32(self.first)) - np.uint32(self.first)
-        bound = self._bound[np.minimum(entry, np.uint32(len(self._bound) - 1))] * blocks.area
+        entry = np.clip(leading_bits(square) - self.first, 0, len(self._bound) - 1)
+        bound = self._bound[entry] * blocks.area
         bound *= groups.may_face_away(blocks)
         return bound
 
