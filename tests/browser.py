@@ -108,8 +108,8 @@ class Page:
 
 
 @contextmanager
-def page() -> Iterator[Page]:
-    """A tab of a browser of its own, without a network, which ends with the block."""
+def page(*, webgpu: bool = False) -> Iterator[Page]:
+    """A tab of a browser of its own, without a network, which ends with the block; `webgpu` gives it WebGPU."""
     program = chromium()
     assert program is not None
     (to_read, to_write), (from_read, from_write) = os.pipe(), os.pipe()
@@ -121,7 +121,8 @@ def page() -> Iterator[Page]:
         os.dup2(101, 4)
 
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"]
+        options = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run"]
+        options += ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"] if webgpu else ["--disable-gpu"]
         offline = ["--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking"]
         process = subprocess.Popen(
             [program, *options, *offline, f"--user-data-dir={profile}", "--remote-debugging-pipe"],

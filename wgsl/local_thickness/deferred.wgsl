@@ -54,7 +54,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     var which = unpack_low(packed.b, BITS);
     if COLOURED {
         thickness = unpack_coloured(packed, BITS);
-        which = unpack_low(packed.g, BITS) | unpack_low(packed.b, BITS) << BITS;
+        which = unpack_low(packed.g, BITS) | (unpack_low(packed.b, BITS) << BITS);
     }
     let transport = transports[which];
     var light_out = let_out_environment(transport) * transmitted_environment(environment, linear_wrap_u, -n, 1.0);

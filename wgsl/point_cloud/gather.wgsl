@@ -146,7 +146,7 @@ fn store(first: vec2u, from_nodes: Sums) {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) i: u32) {
     // Invocations that follow each other walk in step, eight of them on lavapipe: they are kept near each other.
-    let block = vec2u((i & 3u) | (i >> 1u & 4u), (i >> 2u & 1u) | (i >> 3u & 6u));
+    let block = vec2u((i & 3u) | ((i >> 1u) & 4u), ((i >> 2u) & 1u) | ((i >> 3u) & 6u));
     let first = TILE * tile.xy + BLOCK * block;
     let second = first + vec2u(2u, 0u);
     let third = first + vec2u(0u, 2u);
