@@ -15,8 +15,8 @@ from wgsss.cli import main
 from wgsss.methods import METHODS
 from wgsss.reference import REFERENCES
 from wgsss.scene import Scene
-from wgsss.study import run as runs_of
-from wgsss.study.run import Spec
+from wgsss.study import bench_run, provenance
+from wgsss.study.bench_run import RunSpec
 
 FILES = ["chart.html", "chart.png", "chart.svg", "runs.jsonl"]
 
@@ -29,11 +29,11 @@ def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[
 
 
 @pytest.fixture
-def done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Spec]:
+def done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[RunSpec]:
     """Runs that cost nothing, in an empty folder."""
-    specs: list[Spec] = []
+    specs: list[RunSpec] = []
 
-    def fake(scene: Scene, spec: Spec) -> dict[str, Any]:
+    def fake(scene: Scene, spec: RunSpec) -> dict[str, Any]:
         specs.append(spec)
         ms = 10.0 * len(specs)
         costs = {"bake_ms": 1.0, "bake_cached": False, "frame_ms": ms, "frame_ms_quartiles": [ms, ms], "frames": 9}
@@ -42,13 +42,13 @@ def done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Spec]:
         return {**spec.json(), **costs, **where, "error": error, "floor": 0.01}
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(runs_of, "measure", fake)
-    monkeypatch.setattr(runs_of, "adapter", lambda: "a")
+    monkeypatch.setattr(bench_run, "execute", fake)
+    monkeypatch.setattr(provenance, "adapter", lambda: "a")
     monkeypatch.setitem(REFERENCES, "integral", METHODS["lambert"])  # a name is all that is asked of it here
     return specs
 
 
-def test_text_has_a_row_per_run_and_the_files(done: list[Spec], tmp_path: Path, capsys):
+def test_text_has_a_row_per_run_and_the_files(done: list[RunSpec], tmp_path: Path, capsys):
     out, err = run(capsys, "slab", "sphere", "--methods", "lambert,deon07")
     table, files = out.split("\n\n")
     rows = [line.split()[:2] for line in table.splitlines()]
@@ -60,7 +60,7 @@ def test_text_has_a_row_per_run_and_the_files(done: list[Spec], tmp_path: Path, 
     assert err.startswith("slab by lambert: 10.00 ms, error 10 %\nslab by deon07 map_size=256 gaussians=6: 20.00 ms")
 
 
-def test_json_has_the_runs(done: list[Spec], capsys):
+def test_json_has_the_runs(done: list[RunSpec], capsys):
     result = json.loads(run(capsys, "slab", "--methods", "lambert", "--size", "32x24", "-o", "here", "--json")[0])
     assert result["files"] == ["here/chart.svg", "here/chart.png", "here/chart.html"]
     (found,) = result["runs"]
@@ -69,7 +69,7 @@ def test_json_has_the_runs(done: list[Spec], capsys):
     assert (found["scene"], found["size"], found["reference"]) == ("slab", [32, 24], "integral")
 
 
-def test_the_chart_has_all_runs_of_the_folder_and_without_a_scene_it_is_all_there_is(done: list[Spec], capsys):
+def test_the_chart_has_all_runs_of_the_folder_and_without_a_scene_it_is_all_there_is(done: list[RunSpec], capsys):
     run(capsys, "slab", "--methods", "lambert")
     first = Path("bench/chart.svg").read_text()
     run(capsys, "sphere", "--methods", "lambert")
@@ -81,21 +81,21 @@ def test_the_chart_has_all_runs_of_the_folder_and_without_a_scene_it_is_all_ther
     assert [line.split()[0] for line in out.splitlines()[1:3]] == ["slab", "sphere"]
 
 
-def test_a_scene_named_twice_is_measured_once(done: list[Spec], capsys):
+def test_a_scene_named_twice_is_measured_once(done: list[RunSpec], capsys):
     run(capsys, "slab", "slab", "--methods", "lambert,lambert")
     assert len(done) == 1
 
 
-def test_ctrl_c_keeps_what_is_done(done: list[Spec], monkeypatch: pytest.MonkeyPatch, capsys):
-    fake = runs_of.measure
+def test_ctrl_c_keeps_what_is_done(done: list[RunSpec], monkeypatch: pytest.MonkeyPatch, capsys):
+    fake = bench_run.execute
 
-    def interrupted(scene: Scene, spec: Spec) -> Any:
+    def interrupted(scene: Scene, spec: RunSpec) -> Any:
         if len(done) == 2:
             raise KeyboardInterrupt
         return fake(scene, spec)
 
     with monkeypatch.context() as patch:
-        patch.setattr(runs_of, "measure", interrupted)
+        patch.setattr(bench_run, "execute", interrupted)
         run(capsys, "slab", "--methods", "deon07", code=130)
     assert len(Path("bench/runs.jsonl").read_text().splitlines()) == 2
     run(capsys, "slab", "--methods", "deon07")
@@ -117,7 +117,7 @@ def test_ctrl_c_keeps_what_is_done(done: list[Spec], monkeypatch: pytest.MonkeyP
         (["no/scene.toml"], "no/scene.toml"),
     ],
 )
-def test_bad_input_is_one_line(argv, says, done: list[Spec], monkeypatch: pytest.MonkeyPatch, capsys):
+def test_bad_input_is_one_line(argv, says, done: list[RunSpec], monkeypatch: pytest.MonkeyPatch, capsys):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     Path("file").touch()
     out, err = run(capsys, *argv, code=2)
@@ -125,10 +125,10 @@ def test_bad_input_is_one_line(argv, says, done: list[Spec], monkeypatch: pytest
     assert not done
 
 
-def test_choices_are_those_of_every_scene(done: list[Spec], tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
+def test_choices_are_those_of_every_scene(done: list[RunSpec], tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
     seen: list[Scene] = []
-    fake = runs_of.measure
-    monkeypatch.setattr(runs_of, "measure", lambda scene, spec: (seen.append(scene), fake(scene, spec))[1])
+    fake = bench_run.execute
+    monkeypatch.setattr(bench_run, "execute", lambda scene, spec: (seen.append(scene), fake(scene, spec))[1])
     cube = trimesh.creation.box()
     cube.export(tmp_path / "cube.ply")
     run(capsys, "cube.ply", "--methods", "lambert", "--material", "marble", "--size-mm", "80")

@@ -1,4 +1,4 @@
-"""A bench: what is measured, and that what is stopped goes on where it was."""
+"""The benchmark: what a run records, and that a stopped benchmark continues where it was."""
 
 from __future__ import annotations
 
@@ -20,16 +20,19 @@ from wgsss.reference import REFERENCES, Estimate, Reference
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, Scene, load_scene
 from wgsss.stage import Stage
-from wgsss.study import run as runs_of
-from wgsss.study.bench import FILE, bench, read
-from wgsss.study.run import Spec, digest, measure
+from wgsss.study import bench_run, provenance
+from wgsss.study.bench import bench
+from wgsss.study.bench_run import RunSpec, execute
+from wgsss.study.provenance import scene_digest
+from wgsss.study.run_log import FILE, read_runs
+from wgsss.study.run_record import Run
 
 SIZE = (24, 16)
 
 
 @dataclass(frozen=True)
 class Twice(Reference):
-    """Twice what Lambert says, known to a tenth."""
+    """A reference: twice the M of Lambert, with an error of a tenth."""
 
     source: ClassVar[str] = "made up"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = ({},)
@@ -51,8 +54,8 @@ def twice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(REFERENCES, "twice", Twice)
 
 
-def found(spec: Spec, **more: Any) -> dict[str, Any]:
-    """What a run might have found."""
+def run_of(spec: RunSpec, **more: Any) -> Any:
+    """Return a run with made-up figures."""
     costs = {"bake_ms": 1.0, "bake_cached": True, "frame_ms": 2.0, "frame_ms_quartiles": [1.5, 2.5], "frames": 9}
     error = {"rel_rmse": 0.1, "psnr": 30.0, "flip": 0.01, "bias": 1.0}
     where = {"adapter": "a", "clock": "sundial", "date": "2026-01-02T03:04:05+00:00", "passes": {"p": 2.0}, "bytes": 7}
@@ -60,16 +63,16 @@ def found(spec: Spec, **more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[Spec]:
-    """Runs that cost nothing, in place of real ones; those done."""
-    done: list[Spec] = []
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[RunSpec]:
+    """Replace runs by made-up ones that take no time. Returns the list of specs that were run."""
+    done: list[RunSpec] = []
 
-    def fake(scene: Scene, spec: Spec) -> dict[str, Any]:
+    def fake(scene: Scene, spec: RunSpec) -> Run:
         done.append(spec)
-        return found(spec)
+        return run_of(spec)
 
-    monkeypatch.setattr(runs_of, "measure", fake)
-    monkeypatch.setattr(runs_of, "adapter", lambda: "a")
+    monkeypatch.setattr(bench_run, "execute", fake)
+    monkeypatch.setattr(provenance, "adapter", lambda: "a")
     return done
 
 
@@ -77,22 +80,22 @@ def go(scene: Scene, folder: Path, *, methods: Any = None, size: tuple[int, int]
     return bench([scene], methods, folder, size, reference="twice", **rest)
 
 
-def settings(runs: list[dict[str, Any]]) -> list[tuple[str, Any]]:
+def settings(runs: list[Run]) -> list[tuple[str, Any]]:
     return [(run["method"], run["knobs"].get("map_size")) for run in runs]
 
 
-# what a run says
+# what a run records
 
 
 @pytest.fixture(scope="module")
-def lambert(ball: Scene) -> dict[str, Any]:
+def lambert(ball: Scene) -> Run:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(REFERENCES, "twice", Twice)
-        patch.setattr(runs_of, "FRAMES_S", 0.05)
-        return measure(ball, Spec("sphere", digest(ball), "lambert", {}, 0, SIZE, "twice"))
+        patch.setattr(bench_run, "FRAMES_S", 0.05)
+        return execute(ball, RunSpec("sphere", scene_digest(ball), "lambert", {}, 0, SIZE, "twice"))
 
 
-def test_errors_are_those_against_the_reference(lambert: dict[str, Any]) -> None:
+def test_a_run_has_the_errors_against_the_reference(lambert: Run) -> None:
     assert lambert["error"]["rel_rmse"] == pytest.approx(0.5, rel=1e-5)
     assert lambert["error"]["bias"] == pytest.approx(0.5, rel=1e-5)
     assert lambert["floor"] == pytest.approx(0.1, rel=1e-5)
@@ -102,59 +105,59 @@ def test_errors_are_those_against_the_reference(lambert: dict[str, Any]) -> None
         assert lambert["error"]["flip"] is None and "not installed" in lambert["error"]["flip_reason"]
 
 
-def test_time_is_that_of_the_passes(lambert: dict[str, Any]) -> None:
+def test_the_frame_time_is_the_sum_of_the_passes(lambert: Run) -> None:
     low, high = lambert["frame_ms_quartiles"]
     assert 0.0 < low <= lambert["frame_ms"] <= high and lambert["frames"] >= 5
     assert low <= sum(lambert["passes"].values()) <= high
     assert any("lambert/reflect" in name for name in lambert["passes"]) and lambert["bake_ms"] >= 0.0
 
 
-def test_memory_is_at_least_what_pixels_and_vertices_need(lambert: dict[str, Any], ball: Scene) -> None:
+def test_the_memory_includes_pixels_and_vertices(lambert: Run, ball: Scene) -> None:
     M, irradiance, radiance = (16 * SIZE[0] * SIZE[1] for _ in range(3))
     assert lambert["bytes"] > M + irradiance + radiance + 12 * len(ball.objects[0].mesh.positions)
     assert lambert["bytes"] < 64 << 20
 
 
-def test_a_run_is_json_that_says_what_it_is_of(lambert: dict[str, Any], gpu: Any) -> None:
+def test_a_run_is_json_that_identifies_its_setting(lambert: Run, gpu: Any) -> None:
     assert json.loads(json.dumps(lambert, allow_nan=False)) == lambert
     asked = {"scene": "sphere", "method": "lambert", "knobs": {}, "size": list(SIZE), "reference": "twice"}
     assert lambert.items() >= asked.items() and lambert["adapter"] == gpu.name
     assert lambert["version"].startswith("0.") and lambert["date"][:2] == "20"
 
 
-def test_baking_anew_is_told_from_what_the_cache_held(
+def test_a_run_records_whether_the_cache_held_the_baked_data(
     ball: Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
-    monkeypatch.setattr(runs_of, "FRAMES_S", 0.0)
-    monkeypatch.setattr(runs_of, "FEWEST", 2)
-    spec = Spec("sphere", digest(ball), "deon07", {"map_size": 64, "gaussians": 2}, 0, SIZE, "twice")
-    cold, warm = measure(ball, spec), measure(ball, spec)
+    monkeypatch.setattr(bench_run, "FRAMES_S", 0.0)
+    monkeypatch.setattr(bench_run, "FEWEST", 2)
+    spec = RunSpec("sphere", scene_digest(ball), "deon07", {"map_size": 64, "gaussians": 2}, 0, SIZE, "twice")
+    cold, warm = execute(ball, spec), execute(ball, spec)
     assert (cold["bake_cached"], warm["bake_cached"]) == (False, True)
     assert cold["bake_ms"] > warm["bake_ms"]
 
 
 def test_the_reference_is_computed_once_per_scene(ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runs_of, "FRAMES_S", 0.0)
-    monkeypatch.setattr(runs_of, "_last", {})
+    monkeypatch.setattr(bench_run, "FRAMES_S", 0.0)
+    monkeypatch.setattr(bench_run, "_last_truth", {})
     monkeypatch.setattr(Twice, "passes", lambda self, frame: Lambert().passes(frame))
     monkeypatch.setattr(Lambert, "sweep", ({}, {}, {}))
     Twice.estimated.clear()
     other = replace(ball, name="other", exposure=1.0)
     bench([ball, other], ["lambert"], tmp_path, SIZE, reference="twice")
-    assert Twice.estimated == ["sphere", "other"] and len(runs_of._last) == 1  # the last scene only is kept
+    assert Twice.estimated == ["sphere", "other"] and len(bench_run._last_truth) == 1  # the last scene only is kept
 
 
-def test_a_fault_says_which_run_it_was(ball: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_names_the_run(ball: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any) -> None:
         raise RenderError("no light")
 
     monkeypatch.setattr(Lambert, "passes", fail)
     with pytest.raises(RenderError, match=r"^sphere by lambert: no light"):
-        measure(ball, Spec("sphere", digest(ball), "lambert", {}, 0, SIZE, "twice"))
+        execute(ball, RunSpec("sphere", scene_digest(ball), "lambert", {}, 0, SIZE, "twice"))
 
 
-def test_a_digest_stands_for_all_of_a_scene(ball: Scene, tmp_path: Path) -> None:
+def test_a_digest_depends_on_every_part_of_a_scene(ball: Scene, tmp_path: Path) -> None:
     thing = ball.objects[0]
     moved = thing.mesh.positions.copy()
     moved[7, 1] += 1e-3
@@ -166,41 +169,41 @@ def test_a_digest_stands_for_all_of_a_scene(ball: Scene, tmp_path: Path) -> None
         replace(ball, objects=(replace(thing, mesh=replace(thing.mesh, positions=moved)),)),
         replace(ball, objects=(thing, thing)),
     ]
-    assert digest(ball) == digest(load_scene("sphere", vertices=300))
-    assert len({digest(scene) for scene in (ball, *others)}) == 1 + len(others)
+    assert scene_digest(ball) == scene_digest(load_scene("sphere", vertices=300))
+    assert len({scene_digest(scene) for scene in (ball, *others)}) == 1 + len(others)
     image = tmp_path / "sky.exr"
     skies = []
     for value in (0.5, 0.6):
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         with OpenEXR.File(header, {"RGB": np.full((2, 4, 3), value, np.float32)}) as exr:
             exr.write(str(image))
-        skies.append(digest(replace(ball, lights=(EnvironmentLight(file=str(image)),))))
+        skies.append(scene_digest(replace(ball, lights=(EnvironmentLight(file=str(image)),))))
     assert skies[0] != skies[1]
 
 
-# a sweep, and what is left of one
+# sweeps, complete and interrupted
 
 
-def test_every_setting_of_every_method_is_run_once(ball: Scene, tmp_path: Path, measured: list[Spec]) -> None:
+def test_every_setting_of_every_method_is_run_once(ball: Scene, tmp_path: Path, measured: list[RunSpec]) -> None:
     runs = go(ball, tmp_path)
-    wanted = {name: len(kind.sweep) for name, kind in METHODS.items()}
-    assert {name: sum(run["method"] == name for run in runs) for name in wanted} == wanted
-    assert read(tmp_path) == runs and len(measured) == len(runs)
+    counts = {name: len(kind.sweep) for name, kind in METHODS.items()}
+    assert {name: sum(run["method"] == name for run in runs) for name in counts} == counts
+    assert read_runs(tmp_path) == runs and len(measured) == len(runs)
     assert all(run["knobs"].keys() == vars(METHODS[run["method"]]()).keys() for run in runs)
 
 
-def test_what_is_there_is_not_done_again(ball: Scene, tmp_path: Path, measured: list[Spec]) -> None:
+def test_recorded_runs_are_not_repeated(ball: Scene, tmp_path: Path, measured: list[RunSpec]) -> None:
     first = go(ball, tmp_path, methods=["deon07"])
     assert go(ball, tmp_path, methods=["deon07"]) == first and len(measured) == len(first)
     both = go(ball, tmp_path, methods=["lambert", "deon07"])
     assert len(measured) == len(first) + 1
     assert settings(both) == [("lambert", None), *settings(first)]
-    assert settings(read(tmp_path)) == [*settings(first), ("lambert", None)]
+    assert settings(read_runs(tmp_path)) == [*settings(first), ("lambert", None)]
 
 
 @pytest.mark.parametrize("changed", ["size", "scene", "reference", "adapter", "version", "knobs"])
-def test_what_differs_is_done(
-    changed: str, ball: Scene, tmp_path: Path, measured: list[Spec], monkeypatch: pytest.MonkeyPatch
+def test_runs_that_differ_are_done(
+    changed: str, ball: Scene, tmp_path: Path, measured: list[RunSpec], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go(ball, tmp_path, methods=["lambert"])
     scene, size, reference = ball, SIZE, "twice"
@@ -212,58 +215,60 @@ def test_what_differs_is_done(
         monkeypatch.setitem(REFERENCES, "thrice", Twice)
         reference = "thrice"
     elif changed == "adapter":
-        monkeypatch.setattr(runs_of, "adapter", lambda: "b")
+        monkeypatch.setattr(provenance, "adapter", lambda: "b")
     elif changed == "version":
-        monkeypatch.setattr(runs_of, "version", lambda: "9")
+        monkeypatch.setattr(bench_run, "version", lambda: "9")
     else:
         path = tmp_path / FILE
         path.write_text(path.read_text().replace('"knobs": {}', '"knobs": {"k": 1}'))
     bench([scene], ["lambert"], tmp_path, size, reference=reference)
-    assert len(measured) == 2 and len(read(tmp_path)) == 2
+    assert len(measured) == 2 and len(read_runs(tmp_path)) == 2
 
 
 def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    fake: Callable[..., Any] = runs_of.measure
+    fake: Callable[..., Any] = bench_run.execute
     left = iter(range(count))
 
-    def interrupted(scene: Scene, spec: Spec) -> dict[str, Any]:
+    def interrupted(scene: Scene, spec: RunSpec) -> Run:
         if next(left, None) is None:
             raise KeyboardInterrupt
         return fake(scene, spec)
 
-    monkeypatch.setattr(runs_of, "measure", interrupted)
+    monkeypatch.setattr(bench_run, "execute", interrupted)
 
 
-def test_a_stop_loses_at_most_the_run_in_progress(
-    ball: Scene, tmp_path: Path, measured: list[Spec], monkeypatch: pytest.MonkeyPatch
+def test_an_interrupt_loses_at_most_the_run_in_progress(
+    ball: Scene, tmp_path: Path, measured: list[RunSpec], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         interrupt_after(3, patch)
         with pytest.raises(KeyboardInterrupt):
             go(ball, tmp_path, methods=["deon07"])
-    assert settings(read(tmp_path)) == [("deon07", n) for n in (256, 512, 1024)]
+    assert settings(read_runs(tmp_path)) == [("deon07", n) for n in (256, 512, 1024)]
     runs = go(ball, tmp_path, methods=["deon07"])
-    assert settings(runs) == settings(read(tmp_path)) == [("deon07", n) for n in (256, 512, 1024, 2048)]
+    assert settings(runs) == settings(read_runs(tmp_path)) == [("deon07", n) for n in (256, 512, 1024, 2048)]
     assert len(measured) == 4
 
 
-def test_a_line_cut_off_is_no_run_and_is_done_again(ball: Scene, tmp_path: Path, measured: list[Spec]) -> None:
+def test_a_run_whose_line_was_cut_off_is_repeated(ball: Scene, tmp_path: Path, measured: list[RunSpec]) -> None:
     go(ball, tmp_path, methods=["deon07"])
     path = tmp_path / FILE
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.warns(Note, match="line 4 is not a run"):
-        assert settings(read(tmp_path)) == [("deon07", n) for n in (256, 512, 1024)]
+        assert settings(read_runs(tmp_path)) == [("deon07", n) for n in (256, 512, 1024)]
         go(ball, tmp_path, methods=["deon07"])
-        assert settings(read(tmp_path)) == [("deon07", n) for n in (256, 512, 1024, 2048)] and len(measured) == 5
+        assert settings(read_runs(tmp_path)) == [("deon07", n) for n in (256, 512, 1024, 2048)] and len(measured) == 5
 
 
-def test_runs_are_told_as_they_are_kept(ball: Scene, tmp_path: Path, measured: list[Spec]) -> None:
-    told = []
-    go(ball, tmp_path, methods=["deon07"], tell=lambda run: told.append((run, read(tmp_path)[-1])))
-    assert len(told) == 4 and all(run == kept for run, kept in told)
+def test_each_run_is_recorded_before_it_is_reported(ball: Scene, tmp_path: Path, measured: list[RunSpec]) -> None:
+    reported = []
+    go(ball, tmp_path, methods=["deon07"], on_run=lambda run: reported.append((run, read_runs(tmp_path)[-1])))
+    assert len(reported) == 4 and all(run == recorded for run, recorded in reported)
 
 
-def test_what_fails_at_once_leaves_nothing(ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_benchmark_that_fails_at_once_leaves_no_files(
+    ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(*_: Any) -> None:
         raise RenderError("no adapter")
 
@@ -272,8 +277,8 @@ def test_what_fails_at_once_leaves_nothing(ball: Scene, tmp_path: Path, monkeypa
     with pytest.raises(InputError, match="unknown reference 'lambert'"):
         bench([ball], None, tmp_path / "a", SIZE, reference="lambert")
     with pytest.raises(RenderError, match="no adapter"):
-        monkeypatch.setattr(runs_of, "adapter", lambda: "a")
-        monkeypatch.setattr(runs_of, "measure", fail)
+        monkeypatch.setattr(provenance, "adapter", lambda: "a")
+        monkeypatch.setattr(bench_run, "execute", fail)
         go(ball, tmp_path / "a")
     assert not (tmp_path / "a").exists()
     (tmp_path / "file").touch()
@@ -290,16 +295,16 @@ def test_a_cluster_needs_dask(ball: Scene, tmp_path: Path, monkeypatch: pytest.M
         go(ball, tmp_path, scheduler="tcp://127.0.0.1:1")
 
 
-def test_runs_on_a_cluster(ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_does_the_runs(ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask's distributed is not installed")
-    monkeypatch.setattr(runs_of, "FRAMES_S", 0.0)
-    monkeypatch.setattr(runs_of, "FEWEST", 2)
+    monkeypatch.setattr(bench_run, "FRAMES_S", 0.0)
+    monkeypatch.setattr(bench_run, "FEWEST", 2)
     monkeypatch.setattr(METHODS["deon07"], "sweep", ({"map_size": 64}, {"map_size": 128}))
     options: dict[str, Any] = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
     with distributed.LocalCluster(**options, protocol="tcp://") as cluster:
         runs = go(ball, tmp_path, methods=["deon07", "lambert"], scheduler=cluster.scheduler_address)
     assert settings(runs) == [("deon07", 64), ("deon07", 128), ("lambert", None)]
-    assert sorted(map(str, read(tmp_path))) == sorted(map(str, runs))
+    assert sorted(map(str, read_runs(tmp_path))) == sorted(map(str, runs))
     assert np.isclose(runs[-1]["error"]["rel_rmse"], 0.5)
     go(ball, tmp_path, methods=["lambert"])
-    assert len(read(tmp_path)) == 3
+    assert len(read_runs(tmp_path)) == 3

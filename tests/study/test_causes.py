@@ -14,7 +14,7 @@ from wgsss.errors import InputError
 from wgsss.optics import Dipole
 from wgsss.scene import MATERIALS, DirectionalLight, EnvironmentLight
 from wgsss.study import causes as module
-from wgsss.study.causes import CAUSES, SUNS, causes, photon_profiles, shadowing, split, suns
+from wgsss.study.causes import CAUSES, SUNS, causes, photon_profiles, split, suns, with_suns
 
 SEEN = np.ones((1, 2), bool)
 
@@ -34,7 +34,7 @@ def test_split_by_hand():
     assert found.part == pytest.approx({"method": 0.18, "profile": 0.0, "occlusion": 0.0, "diffusion": 0.32})
 
 
-def test_errors_that_make_up_for_each_other():
+def test_errors_that_compensate_each_other():
     volume = pixels(1.0, 1.0)
     found = split([volume * 1.1, volume * 1.4, volume, volume, volume], SEEN)
     assert found.total == pytest.approx(0.1)
@@ -80,18 +80,18 @@ def test_chain_from_method_to_volume(integral):
     assert all(isinstance(light, DirectionalLight) for light in shadowed.lights)
 
 
-def test_without_a_sky_nothing_is_left_of_occlusion(integral):
+def test_occlusion_is_no_cause_without_a_sky(integral):
     scene = lit(DirectionalLight((0, -1, 0), (1, 1, 1)))
     found = causes(scene, {"a": np.full((2, 3, 3), 2.0)}, np.full((2, 3, 3), 0.5), np.ones((2, 3), bool), (3, 2))["a"]
     assert found.own["occlusion"] == 0.0 and len(integral) == 2
 
 
-def test_a_black_volume_tells_no_causes(integral):
+def test_a_black_volume_has_no_causes(integral):
     black = np.zeros((2, 3, 3))
     assert causes(lit(), {"a": black + 1.0}, black, np.ones((2, 3), bool), (3, 2)) == {} and not integral
 
 
-def test_photons_of_each_material_once(monkeypatch):
+def test_photons_are_traced_once_per_material(monkeypatch):
     monkeypatch.setattr(module, "PHOTONS", 20_000)
     skin = MATERIALS["skin1"]
     scene = lit(material=skin)
@@ -104,7 +104,7 @@ def test_photons_of_each_material_once(monkeypatch):
         photon_profiles(lit(material=MATTE))
 
 
-def test_suns_have_the_light_of_the_sky(tmp_path):
+def test_suns_together_have_the_light_of_the_sky(tmp_path):
     towards, irradiance = suns([EnvironmentLight((1.0, 2.0, 3.0))])
     np.testing.assert_allclose(np.linalg.norm(towards, axis=1), 1.0)
     up = np.maximum(towards[:, 1], 0.0)
@@ -122,9 +122,9 @@ def test_suns_have_the_light_of_the_sky(tmp_path):
         np.testing.assert_allclose(irradiance.sum(axis=0), solid_angle * np.array([1, 0.5, 0.25]), rtol=0.01)
 
 
-def test_only_skies_become_suns():
+def test_only_environments_become_suns():
     key = DirectionalLight((0, -1, 0), (1, 1, 1))
-    assert shadowing(lit(key)).lights == (key,)
-    found = shadowing(lit(key, EnvironmentLight((0.1, 0.1, 0.1))))
+    assert with_suns(lit(key)).lights == (key,)
+    found = with_suns(lit(key, EnvironmentLight((0.1, 0.1, 0.1))))
     assert found.lights[0] is key and len(found.lights) == 1 + SUNS
-    assert len(shadowing(lit(key, EnvironmentLight((0.0, 0.0, 0.0)))).lights) == 1
+    assert len(with_suns(lit(key, EnvironmentLight((0.0, 0.0, 0.0)))).lights) == 1

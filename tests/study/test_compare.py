@@ -1,4 +1,4 @@
-"""Methods beside a reference: what is measured, and under which lights."""
+"""The comparison with a reference: its measurements, and the types of light."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def ball(*lights) -> Scene:
 
 
 def test_errors_are_those_of_M():
-    """Lambert's M is 1/FACTOR of the stand-in's everywhere, so all measures are known."""
+    """The M of Lambert is 1/FACTOR of the reference's everywhere, so that all measures are known."""
     found = compare(lit(SUN), ["lambert"], size=SIZE)
     (run,) = found.runs
     M = lambert(lit(SUN), SIZE)
@@ -46,10 +46,10 @@ def test_errors_are_those_of_M():
     assert run.errors.rel_rmse == pytest.approx(1 - 1 / FACTOR, rel=1e-5)
     assert run.errors.bias == pytest.approx(1 / FACTOR, rel=1e-5)
     assert run.errors.floor == pytest.approx(ERROR / FACTOR, rel=1e-5)
-    mean = math.sqrt(np.square(M[found.seen]).mean()) * (FACTOR - 1)
+    mean = math.sqrt(np.square(M[found.mask]).mean()) * (FACTOR - 1)
     assert run.errors.psnr == pytest.approx(20 * math.log10(FACTOR * M.max() / mean), rel=1e-5)
     assert not HAS_FLIP or 0.0 < run.errors.flip < 0.5
-    assert found.seen.any() and found.image.aovs["error"].shape == (24, 32, 3)
+    assert found.mask.any() and found.image.aovs["error"].shape == (24, 32, 3)
 
 
 def test_json_has_the_keys_that_scripts_read():
@@ -69,7 +69,7 @@ def test_a_reference_against_itself_has_no_error():
     assert run.errors.json()["psnr"] is None
 
 
-def test_a_reference_works_once(monkeypatch):
+def test_the_reference_computes_its_estimate_once(monkeypatch):
     asked = []
     estimate = Scaled.estimate
     monkeypatch.setattr(Scaled, "estimate", lambda self, *where: asked.append(where) or estimate(self, *where))
@@ -79,7 +79,7 @@ def test_a_reference_works_once(monkeypatch):
     np.testing.assert_array_equal(found.image.aovs["M_front"], found.truth.M)
 
 
-def test_in_the_dark_nothing_is_relative():
+def test_relative_errors_are_undefined_without_light():
     (run,) = compare(lit(), ["lambert"], size=SIZE).runs
     assert run.errors.rel_rmse is None and run.errors.bias is None
     assert run.errors.flip == (0.0 if HAS_FLIP else None)
@@ -92,7 +92,7 @@ def test_time_moves_the_scene():
     assert lights[0] > 1.0 and lights[1] < 1e-6 * lights[0]  # two seconds later the eye is on the dark side
 
 
-def test_the_same_method_with_other_knobs_is_another_one():
+def test_a_method_with_other_knobs_is_another_method():
     methods = [make_method("deon07", {"map_size": n}) for n in (64, 128, 64)] + [make_method("lambert")]
     assert list(named(methods)) == ["deon07 map_size=64", "deon07 map_size=128", "lambert"]
 
@@ -105,7 +105,7 @@ def test_unknown_names():
 
 
 def test_mean_irradiance_in_closed_form():
-    """Of a plane that faces the light; of a ball in parallel light, a quarter; under a sky, pi times its radiance."""
+    """A plane that faces the light; a ball in parallel light has a quarter; under a sky it is pi times the radiance."""
     floor = lit(mesh=plane(2.0))
     assert mean_irradiance(floor, (DirectionalLight((0, -1, 0), (1, 2, 3)),)) == pytest.approx(2.0)
     assert mean_irradiance(floor, (DirectionalLight((0, -1, 1), (2, 2, 2)),)) == pytest.approx(math.sqrt(2.0))
@@ -120,7 +120,7 @@ def test_mean_irradiance_in_closed_form():
     assert mean_irradiance(ball(), (light,)) == pytest.approx(2.0, rel=0.01)
 
 
-def test_lights_of_all_types_are_as_bright():
+def test_lights_of_all_types_give_the_same_mean_irradiance():
     scene = ball(SUN, EnvironmentLight((0.1, 0.1, 0.1)))
     found = light_types(scene)
     assert list(found) == ["directional", "point", "area", "environment"]

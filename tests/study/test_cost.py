@@ -1,4 +1,4 @@
-"""What a frame costs: which frames count, and what of the device's memory."""
+"""The cost of a frame: which frames are timed, and which memory counts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wgsss.study.cost import footprint, frame_cost
 
 
 class Clockwork:
-    """Draws frames of two passes that take as long as it was told, by a clock that runs on meanwhile."""
+    """A renderer whose frames have two passes of given durations, with a clock that they advance."""
 
     def __init__(self, gpu: Gpu, milliseconds: list[float]) -> None:
         self.left, self.now, self.at = milliseconds, 0.0, []
@@ -33,33 +33,33 @@ class Clockwork:
 
 @pytest.fixture
 def cost_of(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> Any:
-    def measured(milliseconds: list[float], fewest: int, seconds: float) -> Any:
-        made: Any = Clockwork(gpu, milliseconds)
-        monkeypatch.setattr(cost.time, "perf_counter", lambda: made.now)
-        return frame_cost(made, 1.5, fewest, seconds), made
+    def measure(milliseconds: list[float], fewest: int, seconds: float) -> Any:
+        renderer: Any = Clockwork(gpu, milliseconds)
+        monkeypatch.setattr(cost.time, "perf_counter", lambda: renderer.now)
+        return frame_cost(renderer, 1.5, fewest, seconds), renderer
 
-    return measured
-
-
-def test_the_median_frame_counts_and_the_first_does_not(cost_of: Any) -> None:
-    found, made = cost_of([900.0, 8.0, 2.0, 4.0, 6.0, 100.0], 5, 0.0)
-    assert (found.frame_ms, found.quartiles, found.frames) == (6.0, (4.0, 8.0), 5)
-    assert found.passes == {"a": 1.5, "b": 4.5} and not made.left and set(made.at) == {1.5}
-    assert found.clock == made.graph.clock and found.bytes == 0
+    return measure
 
 
-def test_of_an_even_number_the_median_is_between_two(cost_of: Any) -> None:
-    found, _ = cost_of([1.0, 2.0, 8.0], 2, 0.0)
-    assert (found.frame_ms, found.quartiles) == (5.0, (3.5, 6.5))
+def test_the_cost_is_the_median_frame_without_the_first(cost_of: Any) -> None:
+    result, renderer = cost_of([900.0, 8.0, 2.0, 4.0, 6.0, 100.0], 5, 0.0)
+    assert (result.frame_ms, result.quartiles, result.frames) == (6.0, (4.0, 8.0), 5)
+    assert result.passes == {"a": 1.5, "b": 4.5} and not renderer.left and set(renderer.at) == {1.5}
+    assert result.clock == renderer.graph.clock and result.bytes == 0
 
 
-@pytest.mark.parametrize(("ms", "frames"), [(100.0, 10), (900.0, 3), (1.0, cost.MOST)])
-def test_as_many_as_there_is_time_for(cost_of: Any, ms: float, frames: int) -> None:
-    found, _ = cost_of([ms] * (cost.MOST + 2), 3, 0.95)
-    assert found.frames == frames
+def test_the_median_of_an_even_number_is_between_two_frames(cost_of: Any) -> None:
+    result, _ = cost_of([1.0, 2.0, 8.0], 2, 0.0)
+    assert (result.frame_ms, result.quartiles) == (5.0, (3.5, 6.5))
 
 
-def test_footprint_counts_what_persists_once(gpu: Gpu) -> None:
+@pytest.mark.parametrize(("ms", "frames"), [(100.0, 10), (900.0, 3), (1.0, cost.MOST_FRAMES)])
+def test_frames_are_timed_as_long_as_time_allows(cost_of: Any, ms: float, frames: int) -> None:
+    result, _ = cost_of([ms] * (cost.MOST_FRAMES + 2), 3, 0.95)
+    assert result.frames == frames
+
+
+def test_the_footprint_counts_a_persistent_resource_once(gpu: Gpu) -> None:
     renderer = Renderer(lit(DirectionalLight((0.3, -1.0, 0.2), (3.0, 2.0, 1.0))), make_method("lambert"), (32, 24), gpu)
     graph = renderer.frame().graph
     held = {id(h): h for p in graph.ran for h in p.imports.values()}

@@ -17,7 +17,7 @@ SEEN = np.ones((2, 2), bool)
 REFERENCE = np.array([[1.0, 2.0], [2.0, 4.0]])[..., None] * np.ones(3)  # mean square 25/4, mean 9/4, maximum 4
 
 
-def test_by_hand():
+def test_measures_computed_by_hand():
     M = REFERENCE.copy()
     M[0, 0] += 1.0  # 3 of 12 values, one pixel of four
     found = errors(M, REFERENCE, SEEN)
@@ -37,7 +37,7 @@ def test_one_channel_makes_a_pixel_differ():
     assert found.rel_rmse == pytest.approx(math.sqrt(9 / 12) / 2.5)
 
 
-def test_what_is_not_seen_does_not_count():
+def test_pixels_outside_the_mask_do_not_count():
     M, reference, seen = REFERENCE.copy(), REFERENCE.copy(), SEEN.copy()
     seen[0, 0] = False
     M[0, 0], reference[0, 0] = 100.0, math.nan
@@ -54,7 +54,7 @@ def test_equal_images_have_no_error_and_no_finite_psnr():
     assert json.loads(json.dumps(found.json(), allow_nan=False))["psnr"] is None
 
 
-def test_against_black_nothing_is_relative():
+def test_relative_errors_are_undefined_against_black():
     found = errors(REFERENCE, 0 * REFERENCE, SEEN, error=REFERENCE)
     assert (found.rel_rmse, found.psnr, found.psnr_all, found.bias, found.floor) == (None,) * 5
     json.dumps(found.json(), allow_nan=False)
@@ -66,7 +66,7 @@ def test_floor_is_the_references_own_error():
 
 
 @needs_flip
-def test_flip_is_the_mean_over_what_is_seen():
+def test_flip_is_the_mean_over_the_mask():
     side, seen = 32, np.zeros((32, 32), bool)
     seen[8:24, 8:24] = True
     black, M = np.zeros((side, side, 4), np.uint8), np.ones((side, side, 3))
@@ -81,7 +81,7 @@ def test_flip_is_the_mean_over_what_is_seen():
     assert found is not None and whole is not None and found > 0.8 and whole < 0.6 * found
 
 
-def test_where_flip_is_not_installed_the_reason_is_given(monkeypatch: pytest.MonkeyPatch):
+def test_missing_flip_has_a_reason(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(metrics, "find_spec", lambda name: None)
     picture = np.zeros((2, 2, 3), np.uint8)
     found = errors(REFERENCE, REFERENCE, SEEN, display=picture, reference_display=picture)
@@ -90,12 +90,12 @@ def test_where_flip_is_not_installed_the_reason_is_given(monkeypatch: pytest.Mon
     assert "flip_reason" not in errors(REFERENCE, REFERENCE, SEEN).json()
 
 
-def test_coverage_is_over_black():
+def test_coverage_is_composited_over_black():
     assert over_black(np.array([[[200, 100, 50, 51]]], np.uint8)).tolist() == [[[40, 20, 10]]]
     assert over_black(np.array([[[200, 100, 50]]], np.uint8)).tolist() == [[[200, 100, 50]]]
 
 
-def test_map_is_luminance_over_the_references_rms():
+def test_an_error_map_is_luminance_over_the_rms_of_the_reference():
     M = REFERENCE.copy()
     M[1, 0, 1] -= 1.0
     assert error_map(M, REFERENCE, SEEN)[1, 0] == pytest.approx(0.7152 / 2.5)
@@ -104,7 +104,7 @@ def test_map_is_luminance_over_the_references_rms():
 
 
 @pytest.mark.parametrize("where", ["M", "M of the reference", "the reference's error"])
-def test_not_finite(where):
+def test_numbers_that_are_not_finite_are_errors(where):
     bad = REFERENCE.copy()
     bad[1, 0, 2] = math.nan
     given = {"M": REFERENCE, "M of the reference": REFERENCE, "the reference's error": REFERENCE, where: bad}
@@ -112,7 +112,7 @@ def test_not_finite(where):
         errors(*list(given.values())[:2], SEEN, error=given["the reference's error"])
 
 
-def test_nothing_to_compare():
+def test_an_empty_mask_is_an_error():
     with pytest.raises(InputError, match="no pixel shows an object"):
         errors(REFERENCE, REFERENCE, ~SEEN)
     with pytest.raises(InputError, match=r"M of the reference is of shape \(1, 2, 3\), not \(2, 2, 3\)"):

@@ -31,7 +31,7 @@ ONE_TABLE = Material("measured", table=Tabulated([0.0, 1.0, 2.0], [[1.0, 1.0, 1.
         (Case(ONE_TABLE), ["table", "gaussians"]),
     ],
 )
-def test_the_models_that_serve_a_material(case, wanted):
+def test_the_default_models_of_a_material(case, wanted):
     found = profiles(case, default_models(case))
     assert list(found) == wanted
     r = distances_for(found)
@@ -42,7 +42,7 @@ def test_the_models_that_serve_a_material(case, wanted):
         assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
-def test_what_is_said_of_a_profile_is_what_it_says():
+def test_the_numbers_of_a_profile_are_its_values():
     row = described("dipole", SKIN1.profile, np.array([0.1, 1.0]), 4)
     skin = Dipole(SKIN1.sigma_a, SKIN1.sigma_s_prime, 1.3)
     np.testing.assert_array_equal(row["R"], skin.reflectance([0.1, 1.0]))
@@ -67,7 +67,7 @@ def test_a_slab_transmits():
         np.testing.assert_allclose(row["total_T"], slab.total_transmittance, rtol=1e-9)
 
 
-def test_burley_is_given_the_albedo_and_mean_free_path_of_the_material():
+def test_burley_uses_the_albedo_and_mean_free_path_of_the_material():
     found = profiles(Case(SKIN1), ["burley", "burley-diffuse", "burley-dmfp"])
     skin = SKIN1.profile
     for profile in found.values():
@@ -109,29 +109,29 @@ def test_photons_are_one_of_the_models():
         (Case(SKIN1, thickness=1.0), ["multipole"], "'skin1' by the model 'multipole': .*red.*1.295"),
     ],
 )
-def test_what_a_model_cannot_serve_is_told(case, models, says):
+def test_a_model_that_does_not_apply_is_an_error(case, models, says):
     with pytest.raises(InputError, match=says) as raised:
         profiles(case, models)
     assert "\n" not in str(raised.value)
 
 
-def test_a_thickness_is_for_coefficients():
+def test_a_thickness_needs_coefficients():
     for material in (LAYERED, MATERIALS["skin"], ONE_TABLE):
         with pytest.raises(InputError, match=f"'{material.name}': a thickness needs"):
             Case(material, thickness=3.0)
 
 
-def test_an_infinite_value_is_told():
+def test_an_infinite_value_is_an_error():
     burley = profiles(Case(SKIN1), ["burley"])["burley"]
     with pytest.raises(InputError, match="'burley' is infinite at r = 0 mm"):
         described("burley", burley, np.array([1.0, 0.0]), 6)
 
 
-def test_every_model_says_what_it_is():
+def test_every_model_has_a_description():
     assert all(about for _, about in MODELS.values())
 
 
-def test_the_plot_has_ink_of_every_model(tmp_path: Path):
+def test_the_plot_shows_every_model(tmp_path: Path):
     found = profiles(Case(SKIN1, photons=20_000), ["dipole", "burley", "photons"])
     plot(found, "skin1", tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as picture:

@@ -25,7 +25,7 @@ from wgsss.study import compare as module
 from wgsss.study import error_maps, report
 from wgsss.study.causes import CAUSES, Causes
 from wgsss.study.compare import Comparison, compare
-from wgsss.study.report import OWN, check_folder, page, write_report
+from wgsss.study.report import OWN_LIGHTS, check_folder, page, write_report
 
 SIZE = (48, 32)
 # Whatever a file calls its scene, the page and the sheet show it and run none of it.
@@ -54,7 +54,7 @@ def folder(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> 
     return place
 
 
-def test_files(comparison, folder):
+def test_the_report_has_all_files(comparison, folder):
     found = {file.name for file in folder.iterdir()}
     names = ["reference", "lambert", "integral"]  # a method may be of the reference's kind
     assert found == {
@@ -71,7 +71,7 @@ def test_files(comparison, folder):
     assert numbers["causes"]["lambert"]["part"]["profile"] == -0.1
 
 
-def test_versions_say_what_is_not_installed(monkeypatch: pytest.MonkeyPatch):
+def test_versions_name_packages_that_are_not_installed(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(report, "_PACKAGES", ("numpy", "no-such-package"))
     assert report.versions() == {
         "wgsss": __version__,
@@ -92,53 +92,53 @@ def test_linear_images_hold_M(comparison, folder):
 
 def test_error_maps_share_a_scale(comparison, folder):
     """A fifth, and a twenty-fifth, of the same M: on a curve of square roots, colours at places 1 and 1/sqrt(5)."""
-    end = error_maps.top(comparison)
+    end = error_maps.scale_end(comparison)
     maps = error_maps.maps(comparison)
-    most = np.percentile(maps["lambert"][comparison.seen], 99.5)
+    most = np.percentile(maps["lambert"][comparison.mask], 99.5)
     assert most <= 1.001 * end and end <= 2 * most
     np.testing.assert_allclose(maps["integral"], maps["lambert"] / 5, atol=1e-6)
     shown = {name: np.asarray(Picture.open(folder / f"{name}.error.png")) for name in maps}
     assert all(pixels.shape == (32, 48, 4) for pixels in shown.values())
-    np.testing.assert_array_equal(shown["lambert"][..., 3] > 0, comparison.seen)
-    bar = error_maps.bar(1001)[0].astype(int)
+    np.testing.assert_array_equal(shown["lambert"][..., 3] > 0, comparison.mask)
+    bar = error_maps.colour_bar(1001)[0].astype(int)
     np.testing.assert_array_equal(bar[500], matplotlib.colormaps["magma"](0.5, bytes=True))
-    y, x = np.argwhere(comparison.seen)[40]
+    y, x = np.argwhere(comparison.mask)[40]
     for name, pixels in shown.items():
         at = round(1000 * math.sqrt(min(maps[name][y, x] / end, 1.0)))
         assert np.abs(pixels[y, x] - bar[at]).max() <= 4
     assert [text for _, text in error_maps.ticks(0.2)] == ["0 %", "1.25 %", "5 %", "11.2 %", "20 %"]
 
 
-def test_worst_place():
+def test_the_worst_square():
     values, seen = np.zeros((16, 24)), np.ones((16, 24), bool)
     values[9:11, 17:19] = 1.0
-    x, y, side = error_maps.worst(values, seen)
+    x, y, side = error_maps.worst_square(values, seen)
     assert side == 4 and x <= 17 and x + side >= 19 and y <= 9 and y + side >= 11
     values[0, 0], seen[0, 0] = 100.0, False
-    assert error_maps.worst(values, seen) == (x, y, side)
-    assert error_maps.worst(np.zeros((1, 3)), np.ones((1, 3), bool))[2] == 1
+    assert error_maps.worst_square(values, seen) == (x, y, side)
+    assert error_maps.worst_square(np.zeros((1, 3)), np.ones((1, 3), bool))[2] == 1
 
 
 def test_contact_sheet_shows_every_picture(comparison, folder):
     sheet = np.asarray(Picture.open(folder / "contact_sheet.png").convert("RGB")).astype(int)
     assert sheet.shape[0] > 600 and sheet.shape[1] > 1000
-    brightest = comparison.image.display[comparison.seen][:, :3].max(axis=0)
+    brightest = comparison.image.display[comparison.mask][:, :3].max(axis=0)
     assert (np.abs(sheet - brightest).sum(axis=2) < 4).sum() > 50
 
 
-def test_page_needs_nothing_else(comparison):
+def test_the_page_needs_no_other_files(comparison):
     text = page(comparison)
     assert re.findall(r"(?:src|href)=\S+", text) == ['href="data:,">'] and "url(" not in text and "://" not in text
     assert text.count("</script>") == 2 and "/*" + "DATA*/" not in text
     data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.S)[1])
     assert data["title"] == f"{NAME} against integral" and [light["name"] for light in data["lights"]] == [
-        OWN,
+        OWN_LIGHTS,
         "directional",
     ]
     assert len(data["lights"][0]["images"]) == 6
 
 
-def test_a_report_is_written_over_another_and_over_nothing_else(comparison, folder):
+def test_a_report_replaces_an_older_report_and_no_other_files(comparison, folder):
     (folder / "notes.txt").write_text("mine")
     (folder / "metrics.json").write_text("old")
     write_report(comparison, folder)
@@ -147,14 +147,14 @@ def test_a_report_is_written_over_another_and_over_nothing_else(comparison, fold
     assert not list(folder.parent.glob(".*"))
 
 
-def test_what_fails_leaves_nothing(comparison, tmp_path, monkeypatch):
+def test_a_failed_report_leaves_no_files(comparison, tmp_path, monkeypatch):
     monkeypatch.setattr("wgsss.study.contact_sheet.draw", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_report(comparison, tmp_path / "new")
     assert not list(tmp_path.iterdir())
 
 
-def test_folders_that_cannot_be(tmp_path):
+def test_a_folder_that_cannot_be_written_is_an_error(tmp_path):
     assert check_folder(tmp_path / "new") == tmp_path / "new" and not (tmp_path / "new").exists()
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="file: this is not a folder"):
@@ -225,7 +225,7 @@ def test_page_in_a_browser(tab):
     assert tab.said == []
 
 
-def test_the_cut_is_at_the_line_however_large_the_picture(tab):
+def test_the_pictures_are_cut_at_the_line_at_every_zoom(tab):
     """What is left of the line is the left picture, to the pixel: asked of the browser's own drawing."""
     _, _, width, _ = tab.run(BOX)
     for enlarge in (0, 3):

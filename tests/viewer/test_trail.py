@@ -13,7 +13,7 @@ import pytest
 
 from wgsss.methods import make_method
 from wgsss.reference import REFERENCES
-from wgsss.study.run import adapter, digest
+from wgsss.study.provenance import adapter, scene_digest
 from wgsss.viewer import controls, marks
 from wgsss.viewer.costs import milliseconds
 from wgsss.viewer.state import Source, State
@@ -107,7 +107,7 @@ def written(folder: Path, state: State, change: Callable[[dict[str, Any]], Any] 
     """Runs of a bench in a folder."""
     runs = []
     for method, knobs, ms, error in (("lambert", {}, 10.0, 0.5), ("jimenez15", {"taps": 9}, 20.0, 0.1)):
-        run: dict[str, Any] = {"scene": "slab", "digest": digest(state.opened), "method": method, "knobs": knobs}
+        run: dict[str, Any] = {"scene": "slab", "digest": scene_digest(state.opened), "method": method, "knobs": knobs}
         run |= {"size": [64, 64], "reference": "integral", "version": "1", "adapter": adapter(), "step": 0}
         run |= {
             "frame_ms": ms,

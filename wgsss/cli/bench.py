@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wgsss import console
 from wgsss.cli import arguments
 from wgsss.errors import InputError
 from wgsss.text import one_line
+
+if TYPE_CHECKING:
+    from wgsss.study.run_record import Run
 
 _SCENES = "built-in scenes, scene files or meshes; without any, the chart is drawn again from the runs in the folder"
 _FOLDER = "folder for runs.jsonl, chart.svg, chart.png and chart.html (default: bench)"
@@ -47,8 +50,9 @@ def declare(commands: Any) -> None:
 def run(args: Any) -> None:
     if args.table:
         return TABLES[args.table](args)
-    from wgsss.study.bench import bench, read
+    from wgsss.study.bench import bench
     from wgsss.study.chart import draw
+    from wgsss.study.run_log import read_runs
 
     if args.scenes:
         scenes = [arguments.load_scene(args, name) for name in dict.fromkeys(args.scenes)]
@@ -59,20 +63,20 @@ def run(args: Any) -> None:
             args.size or (256, 256),
             reference=args.reference,
             scheduler=args.scheduler,
-            tell=_print_run,
+            on_run=_print_run,
         )
     else:
         if arguments.has_scene_choices(args):
             raise InputError("without a scene there is nothing to measure: --material and the like do not apply")
-        runs = read(args.output)
-    files = [str(file) for file in draw(read(args.output), args.output)]
+        runs = read_runs(args.output)
+    files = [str(file) for file in draw(read_runs(args.output), args.output)]
     arguments.emit(
         args, {"runs": runs, "files": files}, "\n".join([arguments.table(_rows(runs)), "", *map(one_line, files)])
     )
 
 
 def _speedup(args: Any) -> None:
-    from wgsss.study.speedup import DEFAULT_SIZE, FILE, speedup
+    from wgsss.study.jimenez08_speedup import DEFAULT_SIZE, FILE, speedup
 
     if args.scenes != ["crowd"]:
         raise InputError("the table speedup is of the scene crowd: wgsss bench crowd --table speedup")
@@ -80,7 +84,7 @@ def _speedup(args: Any) -> None:
         raise InputError("the table speedup is of the scene crowd as it is: --material and the like do not apply")
     if args.methods is not None or args.scheduler is not None:
         raise InputError("the table speedup is of two methods, measured here: --methods and --scheduler do not apply")
-    table = speedup(args.output, args.size or DEFAULT_SIZE, tell=_print_cell)
+    table = speedup(args.output, args.size or DEFAULT_SIZE, on_cell=_print_cell)
     about = f"times faster than all of the surface, in brackets the paper's; {table.size[0]} x {table.size[1]} pixels"
     lines = [arguments.table(table.rows()), "", f"{about}, maps of {table.map_size}, {table.adapter}"]
     file = str(args.output / FILE)
@@ -97,7 +101,7 @@ def _print_cell(cell: Any) -> None:
         console.print_message(f"{cell.heads} heads at {cell.distance:g}: {times}, {cell.speedup:.2f} times")
 
 
-def _print_run(run: dict[str, Any]) -> None:
+def _print_run(run: Run) -> None:
     """Print a line about a finished run, unless a progress bar is shown."""
     if not console.is_terminal():
         cells = dict(zip(_HEAD, _row(run), strict=True))
@@ -105,11 +109,11 @@ def _print_run(run: dict[str, Any]) -> None:
         console.print_message(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %"))
 
 
-def _rows(runs: list[dict[str, Any]]) -> list[list[str]]:
+def _rows(runs: list[Run]) -> list[list[str]]:
     return [_HEAD, *(_row(run) for run in runs)]
 
 
-def _row(run: dict[str, Any]) -> list[str]:
+def _row(run: Run) -> list[str]:
     low, high = run["frame_ms_quartiles"]
     error = run["error"]
     return [

@@ -31,8 +31,9 @@ def run(args: Any) -> None:
     from dataclasses import replace
 
     from wgsss.methods import METHODS, make_method
-    from wgsss.study import tables
-    from wgsss.study.compare import compare, make_reference
+    from wgsss.study import comparison_tables as tables
+    from wgsss.study.compare import compare
+    from wgsss.study.measurement import make_reference
     from wgsss.study.report import check_folder, write_report
 
     folder = check_folder(args.output or Path(f"{Path(args.scene).stem}-compare"))

@@ -1,12 +1,12 @@
-"""The truths that methods and models are measured against."""
+"""References: methods that take their time, against which other methods and models are measured."""
 
 from __future__ import annotations
 
-from wgsss.reference.estimate import Estimate, Reference
+from wgsss.reference.estimate import Estimate, Finished, Reference
 from wgsss.reference.integral import Integral
 from wgsss.reference.volume import Volume
 
 REFERENCES: dict[str, type[Reference]] = {"volume": Volume, "integral": Integral}
-"""those that can be asked for by name where a method can"""
+"""The references by name. They can be used wherever a method can."""
 
-__all__ = ["REFERENCES", "Estimate", "Integral", "Reference"]
+__all__ = ["REFERENCES", "Estimate", "Finished", "Integral", "Reference"]

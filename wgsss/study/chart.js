@@ -1,13 +1,19 @@
 "use strict";
 const WIDTH = 470, HEIGHT = 390, LEFT = 62, RIGHT = 14, TOP = 12, BOTTOM = 46;
+const { margin: MARGIN, leastMargin: LEAST_MARGIN, mantissas: MANTISSAS, mostTicks: MOST_TICKS } = DATA.axis;
+const LEAST_MARGIN_DB = 0.5; // of the PSNR axis, which is linear
 const percent = v => `${+(100 * v).toPrecision(3)} %`, plain = v => `${+v.toPrecision(4)}`;
-// Less is better in all but `up`; `of` gives null where a run has no such figure, or one that the scale cannot show.
+// `of` returns null if a run has no such figure, or one that the axis cannot show. `up`: more is better.
+// `why` returns the reason why the figure is missing.
 const METRICS = {
-  rel_rmse: { name: "relative RMSE of M", of: e => e.rel_rmse > 0 ? e.rel_rmse : null, log: true, form: percent },
+  rel_rmse: { name: DATA.names.error, of: e => e.rel_rmse > 0 ? e.rel_rmse : null, log: true, form: percent },
   flip: {
     name: "FLIP of the picture", of: e => e.flip > 0 ? e.flip : null, log: true, form: plain, why: e => e.flip_reason,
   },
-  bias: { name: "bias of M, either way", of: e => e.bias === null ? null : Math.abs(e.bias - 1) || null, log: true, form: percent },
+  bias: {
+    name: "bias of M, deviation from 1", of: e => e.bias === null ? null : Math.abs(e.bias - 1) || null, log: true,
+    form: percent,
+  },
   psnr: { name: "PSNR, dB", of: e => e.psnr, log: false, up: true, form: plain },
 };
 const hidden = new Set();
@@ -15,20 +21,21 @@ let metric = METRICS.rel_rmse;
 const get = id => document.getElementById(id);
 
 function svg(parent, tag, attributes, text) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  if (text !== undefined) made.textContent = text;
-  return parent.appendChild(made);
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  if (text !== undefined) element.textContent = text;
+  return parent.appendChild(element);
 }
 
 function html(parent, tag, text, attributes = {}) {
-  const made = Object.assign(document.createElement(tag), attributes);
-  if (text !== undefined) made.textContent = text;
-  return parent.appendChild(made);
+  const element = Object.assign(document.createElement(tag), attributes);
+  if (text !== undefined) element.textContent = text;
+  return parent.appendChild(element);
 }
 
 const colour = method => DATA.methods[method].colour === "#000000" ? "var(--ink)" : DATA.methods[method].colour;
 
+// The corners of a method's mark of radius `r`.
 function shape(method, x, y, r) {
   const [corners, star, turn] = DATA.methods[method].shape;
   const points = [], steps = star ? 2 * corners : corners;
@@ -39,37 +46,41 @@ function shape(method, x, y, r) {
   return points.join(" ");
 }
 
+// As `ticks` of scatter.py; for a linear axis, multiples of a round step.
 function ticks(low, high, log) {
   let found = [];
   if (!log) {
-    const step = [1, 2, 5, 10, 20, 50].find(s => (high - low) / s <= 7) ?? 100;
+    const step = [1, 2, 5, 10, 20, 50].find(s => (high - low) / s <= MOST_TICKS) ?? 100;
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) found.push(v);
     return found;
   }
-  for (const mantissas of [[1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9], [1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
+  for (const mantissas of MANTISSAS) {
     found = [];
     for (let d = Math.floor(Math.log10(low)); d <= Math.ceil(Math.log10(high)); d++)
       for (const m of mantissas) if (m * 10 ** d >= low && m * 10 ** d <= high) found.push(m * 10 ** d);
-    if (found.length <= 7) break;
+    if (found.length <= MOST_TICKS) break;
   }
   return found;
 }
 
+// The map from values to pixels `from` to `to`, with the ends of the axis as `axis_limits` of scatter.py.
 function scale(values, from, to, log) {
   const f = log ? Math.log10 : v => v, back = log ? v => 10 ** v : v => v;
-  const a = f(Math.min(...values)), b = f(Math.max(...values)), pad = 0.1 * Math.max(b - a, log ? 0.5 : 5);
-  const at = v => from + (f(v) - a + pad) / (b - a + 2 * pad) * (to - from);
-  return Object.assign(at, { low: back(a - pad), high: back(b + pad), ticks: ticks(back(a - pad), back(b + pad), log) });
+  const a = f(Math.min(...values)), b = f(Math.max(...values));
+  const margin = Math.max(MARGIN * (b - a), log ? LEAST_MARGIN : LEAST_MARGIN_DB);
+  const at = v => from + (f(v) - a + margin) / (b - a + 2 * margin) * (to - from);
+  const low = back(a - margin), high = back(b + margin);
+  return Object.assign(at, { low, high, ticks: ticks(low, high, log) });
 }
 
-// Of points {x, y}, those that no other one beats, by x.
-function front(points) {
-  const found = [], order = [...points].sort((p, q) => p.x - q.x || p.y - q.y);
+// As `pareto_front` of scatter.py: the points {x, y} that no other point beats, by x.
+function paretoFront(points) {
+  const front = [], order = [...points].sort((p, q) => p.x - q.x || p.y - q.y);
   for (const p of order) {
-    const last = found.at(-1);
-    if (!last || p.y < last.y || (p.x === last.x && p.y === last.y)) found.push(p);
+    const last = front.at(-1);
+    if (!last || p.y < last.y || (p.x === last.x && p.y === last.y)) front.push(p);
   }
-  return found;
+  return front;
 }
 
 function draw() {
@@ -102,34 +113,33 @@ function drawPanel(panel) {
     svg(picture, "line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: y(v), y2: y(v) });
     svg(picture, "text", { x: LEFT - 7, y: y(v) + 4, "text-anchor": "end" }, metric.form(v));
   }
-  if (floor > 0) svg(picture, "text", { x: LEFT + 6, y: bottom - 6 }, "the reference's own error");
-  svg(picture, "text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, "frame time, ms");
+  if (floor > 0) svg(picture, "text", { x: LEFT + 6, y: bottom - 6 }, DATA.names.floor);
+  svg(picture, "text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, DATA.names.time);
   svg(picture, "text", { transform: `translate(13 ${(TOP + bottom) / 2}) rotate(-90)`, ...middle }, metric.name);
 
   const points = runs.map(run => ({ run, x: run.frame_ms, y: (metric.up ? -1 : 1) * metric.of(run.error) }));
-  const best = front(points), at = point => [x(point.x), y(Math.abs(point.y))];
+  const best = paretoFront(points), at = point => [x(point.x), y(Math.abs(point.y))];
   const steps = best.map(p => `H${x(p.x)}V${y(metric.of(p.run.error))}`);
   const start = `M${x(best[0].x)} ${metric.up ? bottom : TOP}`;
   svg(picture, "path", { class: "front", d: `${start}${steps.join("")}H${WIDTH - RIGHT}` });
-  const words = run => [run.method, ...Object.values(run.knobs).filter(value => typeof value === "string")].join(" ");
-  for (const curve of new Set(runs.map(words))) {
-    const own = runs.filter(run => words(run) === curve);
+  for (const curve of new Set(runs.map(run => run.curve))) {
+    const own = runs.filter(run => run.curve === curve);
     const places = own.map(run => [x(run.frame_ms), y(metric.of(run.error))]);
     svg(picture, "polyline", { class: "sweep", points: places.join(" "), stroke: colour(own[0].method) });
   }
   const taken = points.map(point => around(...at(point)));
   for (const point of points) {
-    const [cx, cy] = at(point), kept = best.includes(point), { run } = point, paint = colour(run.method);
+    const [cx, cy] = at(point), isBest = best.includes(point), { run } = point, paint = colour(run.method);
     const [low, high] = run.frame_ms_quartiles;
     svg(picture, "line", { class: "spread", x1: x(low), x2: x(high), y1: cy, y2: cy, stroke: paint });
-    const look = kept ? { fill: paint, stroke: "var(--card)" } : { fill: "var(--card)", stroke: paint };
+    const look = isBest ? { fill: paint, stroke: "var(--card)" } : { fill: "var(--card)", stroke: paint };
     const error = `${metric.name} ${metric.form(metric.of(run.error))}`;
-    const says = `${run.method} ${knobs(run)}: ${plain(run.frame_ms)} ms, ${error}`;
+    const text = `${run.setting}: ${plain(run.frame_ms)} ms, ${error}`;
     const mark = svg(picture, "polygon", {
-      class: kept ? "run best" : "run", points: shape(run.method, cx, cy, kept ? 7.5 : 5.5), tabindex: 0, role: "img",
-      "aria-label": says, "data-method": run.method, ...look,
+      class: isBest ? "run best" : "run", points: shape(run.method, cx, cy, isBest ? 7.5 : 5.5), tabindex: 0,
+      role: "img", "aria-label": text, "data-method": run.method, ...look,
     });
-    for (const event of ["pointerenter", "focus"]) mark.addEventListener(event, () => tell(run, mark));
+    for (const event of ["pointerenter", "focus"]) mark.addEventListener(event, () => showFigures(run, mark));
     for (const event of ["pointerleave", "blur"]) mark.addEventListener(event, () => { get("tip").hidden = true; });
   }
   for (const point of points) label(picture, point.run.label, ...at(point), taken);
@@ -137,48 +147,47 @@ function drawPanel(panel) {
 
 const around = (cx, cy) => ({ left: cx - 6, right: cx + 6, top: cy - 6, bottom: cy + 6 });
 
-// Beside its mark, where it covers no other label and no mark; where there is no room, nowhere.
+// Write a label beside its mark where it covers no other label and no mark. Leave it out if there is no room.
 function label(picture, text, cx, cy, taken) {
   if (!text) return;
-  const made = svg(picture, "text", { class: "label" }, text);
+  const element = svg(picture, "text", { class: "label" }, text);
   const places = [
     [9, -7, "start"], [9, 16, "start"], [-9, -7, "end"], [-9, 16, "end"], [0, -13, "middle"], [0, 22, "middle"],
     [14, 4, "start"], [-14, 4, "end"], [18, -20, "start"], [-18, 28, "end"], [-18, -20, "end"], [18, 28, "start"],
   ];
   for (const [dx, dy, anchor] of places) {
-    for (const [name, value] of [["x", cx + dx], ["y", cy + dy], ["text-anchor", anchor]]) made.setAttribute(name, value);
-    const { x, y, width, height } = made.getBBox(), box = { left: x, right: x + width, top: y, bottom: y + height };
+    for (const [name, value] of [["x", cx + dx], ["y", cy + dy], ["text-anchor", anchor]]) element.setAttribute(name, value);
+    const { x, y, width, height } = element.getBBox(), box = { left: x, right: x + width, top: y, bottom: y + height };
     const inside = x >= LEFT && box.right <= WIDTH - RIGHT && y >= TOP && box.bottom <= HEIGHT - BOTTOM;
     const free = !taken.some(t => box.left < t.right && t.left < box.right && box.top < t.bottom && t.top < box.bottom);
     if (inside && free) return void taken.push(box);
   }
-  made.remove();
+  element.remove();
 }
 
-const knobs = run => Object.entries(run.knobs).map(([knob, value]) => `${knob} ${value}`).join(", ");
-
-function tell(run, mark) {
+// Show all figures of a run beside its mark.
+function showFigures(run, mark) {
   const tip = get("tip"), table = document.createElement("table");
   const row = (name, value, kind = "") => {
-    const made = html(table, "tr", undefined, { className: kind });
-    html(made, "td", name);
-    html(made, "td", value);
+    const line = html(table, "tr", undefined, { className: kind });
+    html(line, "td", name);
+    html(line, "td", value);
   };
   const [low, high] = run.frame_ms_quartiles, { rel_rmse, psnr, flip, bias, flip_reason } = run.error;
-  const or = (value, form) => value === null ? "–" : form(value);
+  const orDash = (value, form) => value === null ? "–" : form(value);
   row("frame", `${plain(run.frame_ms)} ms (${plain(low)} to ${plain(high)}, ${run.frames} frames)`);
-  const dearest = Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6);
-  for (const [name, ms] of dearest) row(name, `${plain(ms)} ms`, "sub");
+  const slowest = Object.entries(run.passes).sort((a, b) => b[1] - a[1]).slice(0, 6);
+  for (const [name, ms] of slowest) row(name, `${plain(ms)} ms`, "sub");
   row("bake", `${plain(run.bake_ms)} ms${run.bake_cached ? " from the cache" : ""}`);
   row("memory", `${plain(run.bytes / 2 ** 20)} MiB`);
-  row("relative RMSE", or(rel_rmse, percent));
-  row("the reference's own", or(run.floor, percent), "sub");
-  row("PSNR", or(psnr, v => `${plain(v)} dB`));
-  row("FLIP", flip_reason ?? or(flip, plain));
-  row("bias", or(bias, plain));
+  row("relative RMSE", orDash(rel_rmse, percent));
+  row("of the reference itself", orDash(run.floor, percent), "sub");
+  row("PSNR", orDash(psnr, v => `${plain(v)} dB`));
+  row("FLIP", flip_reason ?? orDash(flip, plain));
+  row("bias", orDash(bias, plain));
   row("measured", `${run.date.slice(0, 10)}, ${run.version}`, "sub");
   tip.replaceChildren();
-  html(tip, "b", [run.method, knobs(run)].filter(Boolean).join(", "));
+  html(tip, "b", run.setting);
   tip.append(table);
   tip.hidden = false;
   const place = mark.getBoundingClientRect(), size = tip.getBoundingClientRect();

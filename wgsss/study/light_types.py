@@ -1,4 +1,4 @@
-"""One scene under lights of four types that give it the same irradiance."""
+"""A scene under one light of each of four types, all of the same mean irradiance."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from wgsss.scene.light import Light
 
 Array = npt.NDArray[Any]
 
-# Towards the light, in the camera's frame (right, up, towards the viewer): from behind, where light must pass through
-# the object to be seen, and aside, so that a lit rim is seen too.
+# Direction towards the light in the camera's frame (right, up, towards the viewer). The light is behind the object, so
+# that light must pass through it to be seen, and to the side, so that a lit rim is visible too.
 _TOWARDS = (0.62, 0.45, -0.64)
-_DISTANCE = 3.0  # of a light that is near, in radii of the scene
-_SIDE = 1.5  # of an area light, in the same
+_DISTANCE = 3.0  # of a point or area light, in radii of the scene
+_SIDE = 1.5  # of an area light, in radii of the scene
 
 
 def light_types(scene: Scene, time: float = 0.0) -> dict[str, Scene]:
-    """The scene under one white light of each type, from behind and aside of the object as the camera sees it.
+    """Return the scene under one white light of each type, placed behind and to the side of the object.
 
-    Without regard to shadows, the mean irradiance of the surface is that under the scene's own lights.
+    The mean irradiance of the surface, without shadows, is that under the scene's own lights.
     """
     posed = scene.at(time)
     centre = posed.bounds.mean(axis=0)
@@ -42,18 +42,18 @@ def light_types(scene: Scene, time: float = 0.0) -> dict[str, Scene]:
         "area": RectLight(place, away, up, side, side, (1.0, 1.0, 1.0)),
         "environment": EnvironmentLight((1.0, 1.0, 1.0)),
     }
-    wanted = mean_irradiance(posed, posed.lights)
+    target = mean_irradiance(posed, posed.lights)
     power = {"directional": "irradiance", "point": "intensity", "area": "radiance", "environment": "radiance"}
-    found = {}
+    scenes = {}
     for name, light in unit.items():
-        scale = wanted / (mean_irradiance(posed, (light,)) or 1.0)
+        scale = target / (mean_irradiance(posed, (light,)) or 1.0)
         lit = replace(light, **{power[name]: (scale,) * 3})
-        found[name] = replace(scene, name=f"{scene.name}, {name}", lights=(lit,))
-    return found
+        scenes[name] = replace(scene, name=f"{scene.name}, {name}", lights=(lit,))
+    return scenes
 
 
 def mean_irradiance(scene: Scene, lights: Sequence[Light]) -> float:
-    """W/m^2, over the surface of a still scene and the channels, without shadows."""
+    """Return the mean irradiance over the surface of a still scene and over the channels, without shadows, W/m^2."""
     position, normal, area = _triangles(scene)
     total = np.zeros(3)
     for emitter in emitters(lights, np.concatenate([o.placed for o in scene.objects])).lights:
@@ -76,9 +76,9 @@ def mean_irradiance(scene: Scene, lights: Sequence[Light]) -> float:
 
 
 def _triangles(scene: Scene) -> tuple[Array, Array, Array]:
-    """Of all triangles, in world space: centre (N, 3), normal (N, 3) and area (N,)."""
+    """Return the centre (N, 3), normal (N, 3) and area (N,) of all triangles in world space."""
     corners = np.concatenate([o.placed[o.mesh.faces] for o in scene.objects])
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(normal, axis=1)
-    kept = twice > 0.0
-    return corners[kept].mean(axis=1), normal[kept] / twice[kept, None], 0.5 * twice[kept]
+    proper = twice > 0.0
+    return corners[proper].mean(axis=1), normal[proper] / twice[proper, None], 0.5 * twice[proper]

@@ -1,4 +1,4 @@
-"""Profiles as a picture: R and r R, logarithmic and linear, as in figures 6 and 7 of 004."""
+"""A plot of profiles: R and r R over the distance r, logarithmic and linear, as in Mikkelsen 2009, figures 6 and 7."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from wgsss.optics import Photons, Profile
 from wgsss.optics.medium import CHANNELS
@@ -15,7 +16,9 @@ from wgsss.text import figure_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours, which all eyes tell apart.
+Array = npt.NDArray[Any]
+
+# The colours of Okabe and Ito, which people with any colour vision can tell apart.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#999999", "#F0E442")
 _MEASURED = "#000000"
 _ROWS = (
@@ -26,25 +29,25 @@ _ROWS = (
 )
 
 
-def plot(found: dict[str, Profile], title: str, path: Path) -> None:
-    """Write a .png or .svg of profiles by name: a column per channel. T, where there is one, is dashed.
+def plot(profiles: dict[str, Profile], title: str, path: Path) -> None:
+    """Write a .png or .svg of profiles by name, with a column for each channel. T, if there is one, is dashed.
 
-    Raises InputError where the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 14.0), layout="constrained")
     axes = figure.subplots(len(_ROWS), 3)
-    far = np.max([profile.range(0.01) for profile in found.values()], axis=0)
-    near = np.min([profile.range(0.5) for profile in found.values()], axis=0)
+    far = np.max([profile.range(0.01) for profile in profiles.values()], axis=0)
+    near = np.min([profile.range(0.5) for profile in profiles.values()], axis=0)
     for channel, name in enumerate(CHANNELS):
         reach = far[channel] or 1.0
         for (label, scale, weighted), axis in zip(_ROWS, axes[:, channel], strict=True):
             limit = reach if scale == "log" else reach / 3.0
             r = np.linspace(limit / 2000.0, limit, 600)
-            seen = _lines(axis, found, r, channel, weighted)
+            curves = _draw_curves(axis, profiles, r, channel, weighted)
             axis.set_xlim(0.0, limit)
-            _heights(axis, seen, r, near[channel], scale, weighted)
+            _set_limits(axis, curves, r, near[channel], scale)
             axis.set_ylabel(label if channel == 0 else "")
             axis.grid(alpha=0.25)
         axes[0, channel].set_title(name)
@@ -56,39 +59,50 @@ def plot(found: dict[str, Profile], title: str, path: Path) -> None:
         figure.savefig(file, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
 
 
-def _lines(axis: Axes, found: dict[str, Profile], r: Any, channel: int, weighted: bool) -> list[Any]:
-    """Draw the profiles, and give back their values (n,)."""
-    seen = []
+def _draw_curves(axis: Axes, profiles: dict[str, Profile], r: Array, channel: int, weighted: bool) -> list[Array]:
+    """Draw the profiles at distances r (n,), and return their values (n,)."""
+    curves = []
     scale = r if weighted else 1.0
-    for number, (name, profile) in enumerate(found.items()):
+    for number, (name, profile) in enumerate(profiles.items()):
         R = scale * profile.reflectance(r)[:, channel]
         if isinstance(profile, Photons):
-            _points(axis, name, profile, channel, weighted)
+            _draw_bins(axis, name, profile, channel, weighted)
         else:
-            width = max(2.8 - 0.5 * number, 1.0)  # thinner ones on top, so that none hides another
+            width = max(2.8 - 0.5 * number, 1.0)  # later curves are thinner, so that none hides another
             axis.plot(r, R, color=_COLOURS[number % len(_COLOURS)], lw=width, label=name)
         if profile.total_transmittance[channel] > 0.0:
             colour = _MEASURED if isinstance(profile, Photons) else _COLOURS[number % len(_COLOURS)]
             axis.plot(r, scale * profile.transmittance(r)[:, channel], "--", color=colour, lw=1.0)
-        seen.append(R)
-    return seen
+        curves.append(R)
+    return curves
 
 
-def _points(axis: Axes, name: str, profile: Photons, channel: int, weighted: bool) -> None:
-    """Bins of a measured profile with their standard errors, where these leave something to see."""
+def _draw_bins(axis: Axes, name: str, profile: Photons, channel: int, weighted: bool) -> None:
+    """Draw the bins of a measured profile with their standard errors, except bins with large errors."""
     inner, outer = profile.edges[:-1], profile.edges[1:]
     r = np.sqrt(0.5 * (np.square(inner) + np.square(outer)))
     R, error = profile.R[:, channel], profile.R_error[:, channel]
-    told = (R > 0.0) & (error < 0.3 * R) & np.isfinite(r)
-    scale = r[told] if weighted else 1.0
+    is_clear = (R > 0.0) & (error < 0.3 * R) & np.isfinite(r)
+    scale = r[is_clear] if weighted else 1.0
     axis.errorbar(
-        r[told], scale * R[told], scale * error[told], fmt=".", ms=2.5, lw=0.7, color=_MEASURED, label=name, zorder=0
+        r[is_clear],
+        scale * R[is_clear],
+        scale * error[is_clear],
+        fmt=".",
+        ms=2.5,
+        lw=0.7,
+        color=_MEASURED,
+        label=name,
+        zorder=0,
     )
 
 
-def _heights(axis: Axes, seen: list[Any], r: Any, near: float, scale: str, weighted: bool) -> None:
-    """A range of values that shows the curves: near the light some grow without bound, far away all vanish."""
-    values = np.array(seen)[:, r > 0.1 * near]
+def _set_limits(axis: Axes, curves: list[Array], r: Array, near: float, scale: str) -> None:
+    """Set a range of values that shows the curves.
+
+    Values close to r = 0 are left out, because some profiles are unbounded there.
+    """
+    values = np.array(curves)[:, r > 0.1 * near]
     top = values.max(initial=0.0)
     if top <= 0.0:
         return

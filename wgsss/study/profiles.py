@@ -1,4 +1,4 @@
-"""The diffusion profile of one material by several models, side by side."""
+"""The diffusion profile of one material by several models."""
 
 from __future__ import annotations
 
@@ -29,14 +29,15 @@ Array = NDArray[np.float64]
 
 PHOTONS = 1_000_000
 SAMPLES = 64
-"""distances in a result, where none were asked for"""
+"""Default number of distances in a result."""
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What models are asked of: a material, as deep as it goes or `thickness` mm deep, above air.
+    """A material to model, either as deep as it is or as a slab of `thickness` mm above air.
 
-    `k`: Gaussians of a fit. `photons`: traced per channel. Raises InputError where layers are given another thickness.
+    `k` is the number of Gaussians of a fit, `photons` the number of photons traced per channel. Raises InputError if a
+    thickness is given for a material that is not homogeneous.
     """
 
     material: Material
@@ -50,7 +51,7 @@ class Case:
 
     @cached_property
     def stack(self) -> tuple[Layer, ...]:
-        """The medium as layers. Raises InputError where it is known by its profile only."""
+        """The medium as layers. Raises InputError if only its profile is known."""
         if self.material.stack is None:
             raise self._lacks("sigma_a and sigma_s_prime")
         if self.thickness is None:
@@ -59,18 +60,18 @@ class Case:
 
     @cached_property
     def medium(self) -> Layer:
-        """The medium where it is homogeneous. Raises InputError for others."""
+        """The homogeneous medium. Raises InputError if it is not homogeneous."""
         if self.material.sigma_a is None:
             raise self._lacks("sigma_a and sigma_s_prime")
         return self.stack[0]
 
     @cached_property
     def dipole(self) -> Dipole:
-        """The dipole of a homogeneous medium without end."""
+        """The dipole of a semi-infinite homogeneous medium."""
         return Dipole(self.medium.sigma_a, self.medium.sigma_s_prime, self.medium.eta)
 
-    def _lacks(self, what: str) -> InputError:
-        return InputError(f"the material has no {what}")
+    def _lacks(self, properties: str) -> InputError:
+        return InputError(f"the material has no {properties}")
 
 
 def _multipole(case: Case) -> Profile:
@@ -125,11 +126,11 @@ MODELS: dict[str, tuple[Callable[[Case], Profile], str]] = {
     "table": (_table, "the material's own table"),
     "photons": (_photons, "Monte Carlo, with all orders of scattering"),
 }
-"""model -> how it is made, and what it is"""
+"""The models by name: a function that computes the profile of a case, and a description."""
 
 
 def default_models(case: Case) -> list[str]:
-    """The models that say something of a material and take no time."""
+    """Return the models that apply to a material and are fast."""
     if case.thickness is not None:
         return ["multipole", "dipole"]
     if case.material.sigma_a is not None:
@@ -139,44 +140,44 @@ def default_models(case: Case) -> list[str]:
 
 
 def profiles(case: Case, models: Sequence[str]) -> dict[str, Profile]:
-    """The profile by each model. Raises InputError for a model unknown, or one that the material cannot serve."""
+    """Compute the profile by each model. Raises InputError for an unknown model, or one that needs other data."""
     for name in models:
         if name not in MODELS:
             raise unknown("model", name, MODELS)
-    found = {}
+    by_model = {}
     for name in models:
         try:
-            found[name] = MODELS[name][0](case)
+            by_model[name] = MODELS[name][0](case)
         except InputError as error:
             raise InputError(f"material '{case.material.name}' by the model '{name}': {error}") from None
-    return found
+    return by_model
 
 
-def distances_for(found: dict[str, Profile], n: int = SAMPLES) -> Array:
-    """Distances (n,) in mm that show all of the profiles: from near the light to where 0.1 % is left."""
-    tables = [profile.table(2)[0] for profile in found.values()]
+def distances_for(profiles: dict[str, Profile], n: int = SAMPLES) -> Array:
+    """Return distances (n,) in mm that cover all profiles, from close to 0 to where 0.1 % of the light is left."""
+    tables = [profile.table(2)[0] for profile in profiles.values()]
     return np.geomspace(min(r[0] for r in tables), max(r[-1] for r in tables), n)
 
 
 def described(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
-    """A profile in numbers, as JSON has them: at `r` (n,) mm, its totals, its range and its fit by `k` Gaussians.
+    """Return a profile as JSON: its values at `r` (n,) mm, its totals, its range and its fit by `k` Gaussians.
 
-    Raises InputError where R is infinite.
+    Raises InputError if R is infinite at one of the distances.
     """
     R = profile.reflectance(r)
     if not np.all(np.isfinite(R)):
         raise InputError(f"R of the model '{name}' is infinite at r = {r[~np.isfinite(R).all(axis=-1)][0]:g} mm")
     fit = fit_gaussians(profile, k)
-    found: dict[str, Any] = {"model": name, "r_mm": r.tolist(), "R": R.tolist()}
+    numbers: dict[str, Any] = {"model": name, "r_mm": r.tolist(), "R": R.tolist()}
     if profile.total_transmittance.any():
-        found |= {"T": profile.transmittance(r).tolist(), "total_T": profile.total_transmittance.tolist()}
-    found |= {"total": profile.total.tolist(), "range_mm": profile.range(0.01).tolist()}
+        numbers |= {"T": profile.transmittance(r).tolist(), "total_T": profile.total_transmittance.tolist()}
+    numbers |= {"total": profile.total.tolist(), "range_mm": profile.range(0.01).tolist()}
     for error in ("total_error", "total_transmittance_error"):
         if hasattr(profile, error):
-            found[error.replace("transmittance", "T")] = getattr(profile, error).tolist()
-    found["gaussians"] = {
+            numbers[error.replace("transmittance", "T")] = getattr(profile, error).tolist()
+    numbers["gaussians"] = {
         "variances": fit.variances.tolist(),
         "weights": fit.weights.tolist(),
         "error": fit_error(profile, fit).tolist(),
     }
-    return found
+    return numbers

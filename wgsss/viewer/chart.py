@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wgsss.study.chart import front, ticks
+from wgsss.study.scatter import pareto_front, ticks
 from wgsss.viewer import marks
 from wgsss.viewer.costs import SIDES
 from wgsss.viewer.marks import Mark
@@ -66,7 +66,7 @@ def _draw(session: Sequence[Mark], bench: Sequence[Mark]) -> None:
         implot.setup_axis_scale(axis, implot.Scale_.log10)
         implot.setup_axis_limits(axis, low, high, implot.Cond_.always)
         implot.setup_axis_ticks(axis, at, [f"{value:g}{unit}" for value in at])
-    best = front([(mark.ms, mark.error) for mark in bench])
+    best = pareto_front([(mark.ms, mark.error) for mark in bench])
     if best:
         spec = implot.Spec()
         spec.line_color = imgui.ImVec4(1.0, 1.0, 1.0, 0.3)

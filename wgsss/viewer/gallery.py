@@ -82,7 +82,7 @@ class Gallery:
 
         left, top, across, down = region
         if self._colours.reference is None:
-            self._colours.write(error_maps.bar())
+            self._colours.write(error_maps.colour_bar())
         x, y, length = left + 0.2 * across, top + down - 40.0, 0.6 * across
         behind.add_image(self._colours.reference, (x, y), (x + length, y + 10))
         for share, text in error_maps.ticks(WHOLE):

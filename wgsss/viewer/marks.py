@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wgsss.study.bench import Run
-from wgsss.study.chart import LEAST, style
+from wgsss.study.run_record import Run
+from wgsss.study.scatter import LEAST_ERROR, style
 from wgsss.viewer.trail import Point, label_of, words
 
 if TYPE_CHECKING:
@@ -55,13 +55,13 @@ def session(points: Sequence[Point], methods: Sequence[Method]) -> list[Mark]:
 
 def bench(runs: Sequence[Run]) -> list[Mark]:
     """A bench's runs, each method labelled where it is most accurate."""
-    drawn = (run for run in runs if (run["error"]["rel_rmse"] or 0.0) > LEAST)
-    seen = sorted(drawn, key=lambda run: -run["error"]["rel_rmse"])
+    drawn = (run for run in runs if (run["error"]["rel_rmse"] or 0.0) > LEAST_ERROR)
+    seen = sorted(drawn, key=lambda run: -(run["error"]["rel_rmse"] or 0.0))
     best = {run["method"]: run for run in seen}
     return [
         Mark(
             run["frame_ms"],
-            100 * run["error"]["rel_rmse"],
+            100 * (run["error"]["rel_rmse"] or 0.0),
             words(run["method"], run["knobs"]),
             run["method"] if best[run["method"]] is run else "",
             colour(run["method"], BENCH),

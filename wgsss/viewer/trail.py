@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from wgsss.errors import InputError
 from wgsss.methods import Method, make_method, name_of
 from wgsss.reference import REFERENCES
-from wgsss.study.bench import FILE, Run, read
-from wgsss.study.chart import panels
-from wgsss.study.run import adapter, digest
+from wgsss.study.provenance import adapter, scene_digest
+from wgsss.study.run_log import FILE, read_runs
+from wgsss.study.run_record import Run
+from wgsss.study.scatter import panels
 from wgsss.viewer.costs import milliseconds
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Trail:
             return []
         lit = state.scene.objects, state.scene.lights
         if lit != self._bench[0]:
-            self._bench = lit, _last_bench(digest(replace(state.opened, objects=lit[0], lights=lit[1])))
+            self._bench = lit, _last_bench(scene_digest(replace(state.opened, objects=lit[0], lights=lit[1])))
         return self._bench[1]
 
 
@@ -93,7 +94,7 @@ def _view(state: State, size: tuple[int, int]) -> Any:
 
 def _last_bench(seen: str) -> list[Run]:
     try:
-        runs = [run for run in read(FOLDER) if run["digest"] == seen and run["adapter"] == adapter()]
+        runs = [run for run in read_runs(FOLDER) if run["digest"] == seen and run["adapter"] == adapter()]
     except InputError:
         return []
     return next((list(panel.runs) for panel in panels(runs) if runs[-1] in panel.runs), []) if runs else []

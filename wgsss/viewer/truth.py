@@ -15,7 +15,7 @@ from wgsss.errors import InputError, RenderError
 from wgsss.frame import Frame
 from wgsss.methods import Diffused
 from wgsss.reference import Estimate, Reference
-from wgsss.reference.estimate import shown
+from wgsss.reference.estimate import show
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 
@@ -33,7 +33,7 @@ class Known:
         pass
 
     def passes(self, frame: Frame) -> Diffused:
-        return shown(frame, self.estimate)
+        return show(frame, self.estimate)
 
 
 SHARES = (0.25, 0.5, 1.0)

@@ -1,4 +1,4 @@
-"""A comparison's numbers as rows of text, for a terminal and a page."""
+"""The numbers of a comparison as rows of text, for a terminal and for a page."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ HEADINGS = ("method", "rel RMSE", "PSNR", "PSNR all", "bias", "FLIP", "frame", "
 
 
 def measures(run: Run) -> dict[str, str]:
-    """A run's figures by name, with their units."""
-    found = run.errors
+    """Return the figures of a run by name, with their units."""
+    errors = run.errors
     return {
-        "rel RMSE": percent(found.rel_rmse),
-        "PSNR": decibels(found.psnr),
-        "PSNR all": decibels(found.psnr_all),
-        "bias": "-" if found.bias is None else f"{found.bias:.3f}",
-        "FLIP": flip(found.flip, found.flip_reason),
+        "rel RMSE": percent(errors.rel_rmse),
+        "PSNR": decibels(errors.psnr),
+        "PSNR all": decibels(errors.psnr_all),
+        "bias": "-" if errors.bias is None else f"{errors.bias:.3f}",
+        "FLIP": flip(errors.flip, errors.flip_reason),
         "frame": milliseconds(run.frame_ms),
         "bake": milliseconds(run.bake_ms),
         "memory": f"{run.bytes / 2**20:.3g} MiB",
@@ -27,21 +27,21 @@ def measures(run: Run) -> dict[str, str]:
 
 
 def by_method(comparison: Comparison) -> list[list[str]]:
-    """A row for each method, below the headings."""
+    """Return the headings, and a row for each method."""
     return [list(HEADINGS), *([run.name, *measures(run).values()] for run in comparison.runs)]
 
 
 def by_cause(comparison: Comparison) -> list[list[str]]:
-    """What each cause alone would be and, in brackets, what it adds to the whole."""
+    """Return a row for each method: the error of each cause alone and, in brackets, its part of the whole."""
     rows = [["method", "rel RMSE", *CAUSES]]
-    for name, found in comparison.causes.items():
-        shares = [f"{percent(found.own[cause])} ({found.part[cause] * 100:+.2g})" for cause in CAUSES]
-        rows.append([name, percent(found.total), *shares])
+    for name, causes in comparison.causes.items():
+        shares = [f"{percent(causes.own[cause])} ({causes.part[cause] * 100:+.2g})" for cause in CAUSES]
+        rows.append([name, percent(causes.total), *shares])
     return rows
 
 
 def by_light(comparison: Comparison) -> list[list[str]]:
-    """rel_rmse of each method under each type of light, and what the reference's own error accounts for."""
+    """Return the rel_rmse of each method under each type of light, and a last row for the reference's own error."""
     rows = [["method", *comparison.lights]]
     for i, run in enumerate(comparison.runs):
         rows.append([run.name, *(percent(other.runs[i].errors.rel_rmse) for other in comparison.lights.values())])
@@ -50,9 +50,8 @@ def by_light(comparison: Comparison) -> list[list[str]]:
 
 
 def floor(comparison: Comparison) -> str:
-    """What the reference's own error accounts for."""
-    found = comparison.runs[0].errors.floor
-    return f"error of {comparison.reference} itself: {percent(found)}"
+    """Return a sentence about the rel_rmse that the reference's own error accounts for."""
+    return f"error of {comparison.reference} itself: {percent(comparison.runs[0].errors.floor)}"
 
 
 def percent(value: float | None) -> str:
@@ -72,7 +71,7 @@ def milliseconds(value: float) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of text in columns, one row a line, the numbers to the right."""
+    """Format rows as lines of aligned columns: the first column to the left, numbers to the right."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join(
         "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))])

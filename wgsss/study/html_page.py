@@ -1,4 +1,4 @@
-"""Pages that need no network: a template of this folder with its style, its script and the data that it shows."""
+"""Pages that need no network: a template in this folder, filled with its style, its script and its data."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 from wgsss.text import script_json
 
 
-def page(name: str, data: Any) -> str:
-    """The HTML of `name`.html, .css and .js with `data` inside, whatever text that holds."""
+def fill(name: str, data: Any) -> str:
+    """Return the HTML of `name`.html with `name`.css, `name`.js and `data` inside. `data` may contain any text."""
     here = Path(__file__).parent
     text, style, script = ((here / f"{name}.{kind}").read_text(encoding="utf-8") for kind in ("html", "css", "js"))
     for slot, part in (("STYLE", style), ("SCRIPT", script), ("DATA", script_json(data))):  # data may look like a slot

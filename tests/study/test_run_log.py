@@ -1,4 +1,4 @@
-"""The file of a bench's runs: what is damaged in it costs a line, and nothing that writes to it spoils another's."""
+"""The file of runs: a damaged line loses one run only, and processes that append do not damage each other's lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from conftest import ROOT
 
 from wgsss.errors import InputError, Note
 from wgsss.study.chart import draw
-from wgsss.study.runs import FILE, appended, read
+from wgsss.study.run_log import FILE, open_log, read_runs
 
 RUN: dict[str, Any] = {
     "scene": "ball",
@@ -52,7 +52,7 @@ def line(**changed: Any) -> bytes:
 
 @pytest.fixture(autouse=True)
 def long_numbers() -> Any:
-    """json.dumps writes numbers of any length only where Python is told so."""
+    """Let json.dumps write numbers of any length, which Python refuses by default."""
     before = sys.get_int_max_str_digits()
     sys.set_int_max_str_digits(0)
     yield
@@ -60,7 +60,7 @@ def long_numbers() -> Any:
 
 
 @pytest.mark.parametrize("key", RUN)
-def test_a_strange_value_leaves_out_its_line_or_is_drawn(key: str, tmp_path: Path) -> None:
+def test_a_line_with_a_strange_value_is_skipped_or_drawn(key: str, tmp_path: Path) -> None:
     sys.set_int_max_str_digits(4300)
     for value in STRANGE:
         (tmp_path / FILE).write_bytes(line() + b"\n" + line(**{key: value}) + b"\n")
@@ -68,10 +68,10 @@ def test_a_strange_value_leaves_out_its_line_or_is_drawn(key: str, tmp_path: Pat
             with pytest.warns(
                 Note, match=rf"line 2 is not a run \((key '{key}[.\w]*' must be |.*not finite|key .* missing)"
             ):
-                runs = read(tmp_path)
+                runs = read_runs(tmp_path)
             assert runs == [RUN]
         except pytest.fail.Exception:
-            assert len(read(tmp_path)) == 2
+            assert len(read_runs(tmp_path)) == 2
 
 
 @pytest.mark.parametrize("key", [*RUN, *(f"error.{name}" for name in RUN["error"])])
@@ -84,7 +84,7 @@ def test_a_missing_key_is_named(key: str, tmp_path: Path) -> None:
         del run[outer]
     (tmp_path / FILE).write_text(json.dumps(run) + "\n")
     with pytest.raises(InputError, match=rf"runs.jsonl: line 1 is not a run \(key '{key}' is missing\)"):
-        read(tmp_path)
+        read_runs(tmp_path)
 
 
 BAD: dict[str, bytes] = {
@@ -101,38 +101,38 @@ BAD: dict[str, bytes] = {
 
 
 @pytest.mark.parametrize("bad", BAD)
-def test_a_bad_line_is_left_out_with_a_warning(bad: str, tmp_path: Path) -> None:
+def test_a_damaged_line_is_skipped_with_a_warning(bad: str, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(line() + b"\n" + BAD[bad] + b"\n" + line(scene="other"))
     with pytest.warns(Note, match=r"line 2 is not a run") as caught:
-        assert [run["scene"] for run in read(tmp_path)] == ["ball", "other"]
+        assert [run["scene"] for run in read_runs(tmp_path)] == ["ball", "other"]
     assert len(caught) == 1 and len(str(caught[0].message)) < 300
 
 
-def test_many_bad_lines_are_one_warning(tmp_path: Path) -> None:
+def test_many_damaged_lines_give_one_warning(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"x\n" * 100 + line() + b"\n")
-    with pytest.warns(Note, match=r"of 101 lines: line 1 is .*line 3 is .* and 97 more$") as caught:
-        assert len(read(tmp_path)) == 1
+    with pytest.warns(Note, match=r"100 of 101 lines skipped: line 1 is .*line 3 is .* and 97 more$") as caught:
+        assert len(read_runs(tmp_path)) == 1
     assert len(caught) == 1
 
 
-def test_what_editors_add_is_no_damage(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+def test_marks_and_blank_lines_of_editors_are_accepted(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
     (tmp_path / FILE).write_bytes(b"\xef\xbb\xbf" + line() + b"\r\n\r\n \n" + line(extra=[1, {"a": None}]))
-    assert read(tmp_path) == [RUN, RUN] and not recwarn.list
+    assert read_runs(tmp_path) == [RUN, RUN] and not recwarn.list
 
 
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"x\n"])
 def test_a_file_without_runs_is_an_error(content: bytes, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(content)
     with pytest.raises(InputError, match=r"runs.jsonl: (there are no runs in it|line 1 is not a run)"):
-        read(tmp_path)
+        read_runs(tmp_path)
 
 
 @pytest.mark.parametrize("make", [os.mkdir, os.mkfifo, lambda path: os.symlink("/dev/zero", path)])
-def test_what_is_no_file_is_neither_read_nor_written(make: Callable[[Path], None], tmp_path: Path) -> None:
+def test_a_path_that_is_not_a_regular_file_is_refused(make: Callable[[Path], None], tmp_path: Path) -> None:
     make(tmp_path / FILE)
     with pytest.raises(InputError, match=r"runs.jsonl: this is (a folder|not a regular file)"):
-        read(tmp_path)
-    with pytest.raises(InputError, match=r"runs.jsonl: this is (a folder|not a regular file)"), appended(tmp_path):
+        read_runs(tmp_path)
+    with pytest.raises(InputError, match=r"runs.jsonl: this is (a folder|not a regular file)"), open_log(tmp_path):
         pass
 
 
@@ -146,51 +146,51 @@ def test_runs_of_extreme_values_are_drawn(tmp_path: Path) -> None:
             changed = {"frame_ms": time, "frame_ms_quartiles": [time, time], "error": error, "floor": value}
             names = {name: text for name in ("scene", "method", "adapter", "clock", "reference", "version", "date")}
             file.write(line(step=i, knobs={text: text + str(i)}, **changed, **names) + b"\n")
-    assert all(path.stat().st_size > 0 for path in draw(read(tmp_path), tmp_path))
+    assert all(path.stat().st_size > 0 for path in draw(read_runs(tmp_path), tmp_path))
 
 
 # writing
 
 
-def test_a_folder_is_made_for_runs_and_goes_again_without_any(tmp_path: Path) -> None:
-    with appended(tmp_path / "a" / "b") as (runs, append):
+def test_a_folder_is_created_for_runs_and_removed_if_it_stays_empty(tmp_path: Path) -> None:
+    with open_log(tmp_path / "a" / "b") as (runs, append):
         assert runs == []
     assert not list(tmp_path.iterdir())
-    with pytest.raises(KeyboardInterrupt), appended(tmp_path / "a" / "b"):
+    with pytest.raises(KeyboardInterrupt), open_log(tmp_path / "a" / "b"):
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
-    with appended(tmp_path / "a" / "b") as (runs, append):
+    with open_log(tmp_path / "a" / "b") as (runs, append):
         append(RUN)
-    assert read(tmp_path / "a" / "b") == [RUN]
+    assert read_runs(tmp_path / "a" / "b") == [RUN]
 
 
-def test_a_line_that_was_cut_off_spoils_no_other(tmp_path: Path) -> None:
+def test_a_cut_off_line_does_not_damage_the_next_one(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(line() + b"\n" + line()[:50])
-    with pytest.warns(Note, match="line 2"), appended(tmp_path) as (_, append):
+    with pytest.warns(Note, match="line 2"), open_log(tmp_path) as (_, append):
         append(RUN)
     with pytest.warns(Note, match="line 2"):
-        assert read(tmp_path) == [RUN, RUN]
+        assert read_runs(tmp_path) == [RUN, RUN]
 
 
-def test_a_last_line_without_an_end_is_kept(tmp_path: Path) -> None:
+def test_a_last_line_without_a_line_break_is_kept(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(line())
-    with appended(tmp_path) as (runs, append):
+    with open_log(tmp_path) as (runs, append):
         assert runs == [RUN]
         append(RUN)
-    assert read(tmp_path) == [RUN, RUN]
+    assert read_runs(tmp_path) == [RUN, RUN]
 
 
 def test_a_short_write_is_completed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with appended(tmp_path) as (_, append):
+    with open_log(tmp_path) as (_, append):
         monkeypatch.setattr(Path, "open", _slow_open)
         append(RUN)
         append(RUN)
     monkeypatch.undo()
-    assert read(tmp_path) == [RUN, RUN]
+    assert read_runs(tmp_path) == [RUN, RUN]
 
 
-def test_a_full_disk_undoes_the_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with appended(tmp_path) as (_, append):
+def test_a_full_disk_leaves_no_partial_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_log(tmp_path) as (_, append):
         append(RUN)
         monkeypatch.setattr(Path, "open", lambda path, *args, **rest: _slow_open(path, *args, **rest, room=50))
         with pytest.raises(InputError, match=r"runs.jsonl: cannot be written \(No space left"):
@@ -232,24 +232,24 @@ def _slow_open(path: Path, *args: Any, room: int = 1 << 30, **rest: Any) -> Any:
 APPENDER = """
 import sys
 from pathlib import Path
-from wgsss.study.runs import appended
+from wgsss.study.run_log import open_log
 sys.path.insert(0, {tests!r})
-from test_runs import RUN
+from test_run_log import RUN
 name = sys.argv[1]
-with appended(Path({folder!r})) as (_, append):
+with open_log(Path({folder!r})) as (_, append):
     for step in range(300):
         append({{**RUN, "scene": name, "step": step}})
 """
 
 
-def test_processes_that_append_at_once_lose_no_line(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+def test_processes_that_append_at_the_same_time_lose_no_line(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
     script = APPENDER.format(tests=str(Path(__file__).parent), folder=str(tmp_path / "runs"))
     path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
     command = [sys.executable, "-c", script]
     names = ["a", "b" * 900]
     running = [subprocess.Popen([*command, name], env={**os.environ, "PYTHONPATH": path}) for name in names]
     assert [process.wait(timeout=60) for process in running] == [0, 0]
-    runs = read(tmp_path / "runs")
+    runs = read_runs(tmp_path / "runs")
     assert {name: [run["step"] for run in runs if run["scene"] == name] for name in names} == {
         name: list(range(300)) for name in names
     }

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from wgsss.cli import main
-from wgsss.study import speedup as table
-from wgsss.study.speedup import DISTANCES, HEADS, PAPER, UNIT_MM
+from wgsss.study import jimenez08_speedup as table
+from wgsss.study.jimenez08_speedup import DISTANCES, HEADS, PAPER, UNIT_MM
 
 
 class Clock:
@@ -43,9 +43,9 @@ def clock(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Clock]:
     return Clock.made
 
 
-def test_cells_hold_the_fastest_frames_of_both_kinds_in_turn(clock):
+def test_cells_hold_the_fastest_frames_of_both_methods_in_turn(clock):
     cells = []
-    found = table.speedup("here", (960, 600), tell=cells.append)
+    found = table.speedup("here", (960, 600), on_cell=cells.append)
     assert [(cell.heads, cell.distance) for cell in found.cells] == [(n, d) for n in HEADS for d in DISTANCES]
     assert list(found.cells) == cells and found.clock == "sundial" and found.map_size == 1024
     for cell in cells:
@@ -57,7 +57,7 @@ def test_cells_hold_the_fastest_frames_of_both_kinds_in_turn(clock):
     assert kept == json.loads(json.dumps(found.json())) and len(kept["cells"]) == 30
 
 
-def test_the_papers_table_is_as_printed():
+def test_the_table_of_the_paper_is_as_printed():
     assert (PAPER[0][0], PAPER[0][-1], PAPER[-1][-1], PAPER[2][1]) == (1.17, 1.61, 2.77, 1.39)
     assert np.shape(PAPER) == (len(HEADS), len(DISTANCES)) and min(map(min, PAPER)) == 1.10
 
@@ -96,7 +96,7 @@ def test_the_command_prints_the_table_and_the_file(clock, capsys):
         (["crowd", "--table", "other"], "invalid choice: 'other'"),
     ],
 )
-def test_bad_input_is_one_line(clock, capsys, argv, said):
+def test_an_input_error_is_one_line(clock, capsys, argv, said):
     Path("file").touch()
     assert main(["bench", *argv]) == 2
     out, err = capsys.readouterr()

@@ -1,4 +1,7 @@
-"""The file of a bench's runs, one a line: read whatever it holds, and appended to by several processes at once."""
+"""The file runs.jsonl: one run of the benchmark per line.
+
+Damaged lines are skipped, and several processes can append at once.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +11,21 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO
 
 from wgsss.errors import InputError, Note
 from wgsss.folders import created_folder
-from wgsss.study.run_line import Run, parsed
+from wgsss.study.run_record import Run, parse_run
 from wgsss.userfiles import require_file
 
 FILE = "runs.jsonl"
-_NAMED = 3  # lines that a warning names
+_NAMED = 3  # damaged lines that a warning names
 
 
-def read(folder: str | Path) -> list[Run]:
-    """The runs in a folder, in the order in which they ended. Lines that are no runs are left out with a warning.
+def read_runs(folder: str | Path) -> list[Run]:
+    """Read the runs in a folder, in the order in which they ended. Lines that are not runs are skipped with a warning.
 
-    Raises InputError where there is no run.
+    Raises InputError if there are no runs.
     """
     path = Path(folder) / FILE
     runs, faults = _read(path)
@@ -32,7 +35,7 @@ def read(folder: str | Path) -> list[Run]:
 
 
 def _read(path: Path) -> tuple[list[Run], list[str]]:
-    """The runs of a file, and what is wrong with its other lines."""
+    """Return the runs of a file, and for each other line a text that says what is wrong with it."""
     require_file(path, may_be_empty=True)
     try:
         lines = path.read_bytes().removeprefix(b"\xef\xbb\xbf").split(b"\n")
@@ -43,27 +46,27 @@ def _read(path: Path) -> tuple[list[Run], list[str]]:
         if not line.strip():
             continue
         try:
-            runs.append(parsed(line))
+            runs.append(parse_run(line))
         except InputError as error:
             faults.append(f"line {number} is not a run ({error})")
     if runs and faults:
         more = f" and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
-        note = f"{path}: left out, of {len(runs) + len(faults)} lines: {'; '.join(faults[:_NAMED])}{more}"
+        note = f"{path}: {len(faults)} of {len(runs) + len(faults)} lines skipped: {'; '.join(faults[:_NAMED])}{more}"
         warnings.warn(note, Note, stacklevel=3)
     return runs, faults
 
 
 @contextmanager
-def appended(folder: Path) -> Iterator[tuple[list[Run], Callable[[Run], None]]]:
-    """The runs in a folder, which may have none yet or be missing, and what appends one.
+def open_log(folder: Path) -> Iterator[tuple[list[Run], Callable[[Run], None]]]:
+    """Create the folder if needed, and yield the runs in it and a function that appends a run.
 
-    A folder to which nothing was appended goes again, if it was made here. Raises InputError where it cannot be
+    A folder that this call created is removed again if no run was appended. Raises InputError if the file cannot be
     written.
     """
     path = folder / FILE
     with created_folder(folder):
-        held = path.exists()
-        if held:
+        existed = path.exists()
+        if existed:
             require_file(path, may_be_empty=True)
         try:
             path.open("ab").close()
@@ -73,22 +76,22 @@ def appended(folder: Path) -> Iterator[tuple[list[Run], Callable[[Run], None]]]:
             yield _read(path)[0], lambda run: _append(path, run)
         finally:
             with suppress(OSError):
-                if not held and path.stat().st_size == 0:
+                if not existed and path.stat().st_size == 0:
                     path.unlink()
 
 
 def _append(path: Path, run: Run) -> None:
-    """A line, as a whole or not at all. One that was cut off before it is ended first, so that it spoils no other."""
+    """Append a whole line or nothing. If the last line of the file was cut off, end it first."""
     line = json.dumps(run, ensure_ascii=False, allow_nan=False).encode("utf-8", "backslashreplace") + b"\n"
     try:
-        with path.open("ab", buffering=0) as file, _locked(file) as locked:
+        with path.open("ab", buffering=0) as file, _locked(file) as is_locked:
             size = file.seek(0, os.SEEK_END)
             try:
                 rest = line if _ends_a_line(path) else b"\n" + line
                 while rest:
                     rest = rest[file.write(rest) or 0 :]
             except BaseException:
-                if locked:  # and so nobody has written after us
+                if is_locked:  # so no other process has appended since
                     file.truncate(size)
                 raise
     except OSError as error:
@@ -104,8 +107,8 @@ def _ends_a_line(path: Path) -> bool:
 
 
 @contextmanager
-def _locked(file: Any) -> Iterator[bool]:
-    """Keep other processes from appending in the block; whether that could be done."""
+def _locked(file: IO[bytes]) -> Iterator[bool]:
+    """Lock a file against other processes during the block. Yields whether that worked."""
     try:
         import fcntl
 
@@ -113,4 +116,4 @@ def _locked(file: Any) -> Iterator[bool]:
     except (ImportError, OSError):  # Windows, and file systems without locks
         yield False
         return
-    yield True  # the lock goes as the file is closed
+    yield True  # closing the file releases the lock
