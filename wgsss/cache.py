@@ -1,11 +1,9 @@
-"""The cache of baked data: one file per entry, per user, keyed by content and by the code that makes it."""
+"""The cache of baked data: one file per entry, per user, named by a fingerprint of its input and its code."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import stat
-import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Sequence
@@ -16,18 +14,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import console, wgsl
+from wgsss import console
 from wgsss.errors import Note
+from wgsss.fingerprint import fingerprint
 
 Arrays = dict[str, npt.NDArray[Any]]
-KeyPart = bytes | str | int | float | npt.NDArray[Any] | None
 
 _CONTENTS = "wgsss contents"
-"""the member of an entry that says which one it is and what else it holds"""
+"""the member of a file that lists which entry it is and which arrays it has"""
 
 
 def folder() -> Path:
-    """Where entries are: `$WGSSS_CACHE`, else the user's cache folder."""
+    """Return the folder of the entries: `$WGSSS_CACHE`, else the user's cache folder."""
     if chosen := os.environ.get("WGSSS_CACHE"):
         return Path(chosen)
     import platformdirs
@@ -35,35 +33,30 @@ def folder() -> Path:
     return Path(platformdirs.user_cache_dir("wgsss"))
 
 
-def cached(
-    kind: str,
-    key: Sequence[KeyPart],
-    make: Callable[[], Arrays],
-    *,
-    code: Sequence[Any] = (),
-    label: str = "",
-) -> Arrays:
-    """What `make()` gives, from the cache where an entry with this key is there.
+def cached(kind: str, key: Sequence[object], make: Callable[[], Arrays], *, label: str = "") -> Arrays:
+    """Return the arrays of `make()`, from the cache where it has an entry with this key.
 
-    An entry is an uncompressed .npz, whose members carry CRC-32 checksums; one of them says which entry it is and what
-    else is in it. An entry that is damaged or another one is made anew with a warning; where the folder cannot be
-    written, the result is used and a warning given. Entries are written to a temporary file and moved into place, so
-    that processes that bake the same entry at once do not disturb each other.
+    The name of an entry is a fingerprint of the key, of the code of `make` and of the code of the key's dataclasses:
+    if one of them changes, a new entry is made.
 
-    `make` runs with one BLAS thread: with two, sums are rounded otherwise, and equal keys would stand for other bits.
+    An entry is an uncompressed .npz file, whose members have CRC-32 checksums. One member lists which entry it is and
+    which arrays it has. If a file is damaged or is another entry, it warns and calls `make` again; if the folder cannot
+    be written, it warns and returns the result. A file is written under a temporary name and then renamed, so that
+    several processes can make the same entry at the same time.
+
+    `make` runs with one BLAS thread, because the rounding of sums depends on the number of threads, and entries with
+    the same key must have the same bits.
 
     Args:
-        kind: what the entry is, the head of its file name.
-        key: the content it is made of.
-        make: makes the arrays by name. The module that defines it is part of the key.
-        code: what else the result depends on: functions or classes, standing for their modules, and names of WGSL
-            modules.
-        label: says what is being made, on a terminal, while `make` runs.
+        kind: the sort of entry, the head of its file name.
+        key: all values that `make` reads, of the types that `fingerprint` knows.
+        make: returns the arrays by name.
+        label: the text shown on a terminal while `make` runs.
     """
-    path = folder() / f"{kind}-{_digest(key, make, code)}.npz"
-    found = _read(path)
-    if found is not None:
-        return found
+    path = folder() / f"{kind}-{fingerprint([*key], make.__module__)[:32]}.npz"
+    entry = _read(path)
+    if entry is not None:
+        return entry
     from threadpoolctl import threadpool_limits
 
     with console.activity(label), threadpool_limits(1, "blas"):
@@ -77,17 +70,17 @@ def cached(
 
 
 def entries() -> dict[Path, int]:
-    """The entries there are, and bytes of each."""
-    found = {}
+    """Return the files of all entries with their sizes in bytes."""
+    sizes = {}
     with suppress(OSError):  # there is no folder yet, or it cannot be read
         for path in folder().glob("*.npz"):
             with suppress(OSError):  # another process has just replaced it
-                found[path] = path.stat().st_size
-    return found
+                sizes[path] = path.stat().st_size
+    return sizes
 
 
 def _read(path: Path) -> Arrays | None:
-    """The arrays of an entry, or None where there is none. Warns of one that is of no use."""
+    """Return the arrays of an entry, or None where there is no file, or a file that is of no use, with a warning."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise ValueError
@@ -105,28 +98,8 @@ def _read(path: Path) -> Arrays | None:
 
 
 def _contents(path: Path, arrays: Arrays) -> str:
-    """Which entry it is, and what it holds."""
+    """Return a text that identifies the entry and lists its arrays."""
     return "; ".join([path.stem, *sorted(f"{name} {a.dtype.str} {a.shape}" for name, a in arrays.items())])
-
-
-def _digest(key: Sequence[KeyPart], make: Callable[[], Arrays], code: Sequence[Any]) -> str:
-    digest = hashlib.sha256(_CONTENTS.encode())
-
-    def add(tag: str, data: bytes) -> None:
-        digest.update(f"{tag}:{len(data)}:".encode())
-        digest.update(data)
-
-    for item in (make, *code):
-        if isinstance(item, str):
-            add("code", wgsl.load(item).source.encode())
-        else:
-            add("code", Path(str(sys.modules[item.__module__].__file__)).read_bytes())
-    for part in key:
-        if isinstance(part, np.ndarray):
-            add(f"array {part.dtype.str} {part.shape}", np.ascontiguousarray(part).tobytes())
-        else:
-            add(type(part).__name__, part if isinstance(part, bytes) else repr(part).encode())
-    return digest.hexdigest()[:32]
 
 
 def _write(path: Path, arrays: Arrays) -> None:

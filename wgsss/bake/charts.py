@@ -11,8 +11,8 @@ import numpy.typing as npt
 from wgsss import wgsl
 from wgsss.bake.seams import apply, find_seams
 from wgsss.bake.stretch import stretch
-from wgsss.bake.unwrap import RenderMesh, atlas_vertices
-from wgsss.cache import Arrays, KeyPart, cached
+from wgsss.bake.unwrap import RenderMesh
+from wgsss.cache import Arrays, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.scene.mesh import Mesh
@@ -44,21 +44,12 @@ class Charts:
 
 def charts(gpu: Gpu, mesh: Mesh, render_mesh: RenderMesh, size: int) -> Charts:
     """The charts of `render_mesh`, the render mesh of `mesh`, on maps of `size` x `size` texels; cached."""
-    key: list[KeyPart] = [
-        mesh.positions,
-        render_mesh.vertex,
-        render_mesh.atlas,
-        render_mesh.faces,
-        render_mesh.charts,
-        size,
-    ]
 
     def make() -> Arrays:
         return _make(gpu, mesh, render_mesh, size)
 
-    code = [find_seams, stretch, atlas_vertices, "bake/charts", "bake/gutter"]
     label = f"mapping {len(mesh.faces)} faces to {size} x {size} texels"
-    arrays = cached("charts", key, make, code=code, label=label)
+    arrays = cached("charts", [mesh, render_mesh, size, gpu.name], make, label=label)
     layout = wgsl.load("charts").layout("array<Seam>")
     rows, owners = arrays["seams"], arrays["owners"]
     return Charts(

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake.suns import Sun, take_suns
-from wgsss.cache import KeyPart, cached
+from wgsss.cache import cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph, Handle
 from wgsss.scene import DirectionalLight, EnvironmentLight, Material
@@ -75,9 +75,9 @@ def prefilter(gpu: Gpu, pixels: npt.NDArray[np.float32], material: Material) -> 
         graph.run(irradiance, reflection)
         return {"irradiance": graph.read(irradiance), "reflection": graph.read(reflection)}
 
-    key: list[KeyPart] = [pixels, material.roughness, material.eta, material.specular]
-    code = ("frame/prefilter_irradiance", "frame/prefilter_reflection", "frame/rho_dt")
-    maps = cached("environment", key, make, code=code, label="filtering the environment")
+    # Only what the surface does counts, so that no filter runs anew for another medium or colour below it.
+    key = [pixels, material.roughness, material.eta, material.specular, gpu.name]
+    maps = cached("environment", key, make, label="filtering the environment")
     return Prefiltered(*(gpu.texture(maps[name], "rgba16float") for name in ("irradiance", "reflection")))
 
 

@@ -28,9 +28,7 @@ def normal_spread(positions: Array, normals: Array, distance: float) -> Array:
         return {"normal_spread": _normal_spread(positions.astype(np.float64), normals.astype(np.float64), distance)}
 
     label = f"angles between {len(positions)} normals within {distance:.3g} mm"
-    return cached("normal_spread", [positions, normals, distance], make, code=[_normal_spread], label=label)[
-        "normal_spread"
-    ]
+    return cached("normal_spread", [positions, normals, distance], make, label=label)["normal_spread"]
 
 
 def _normal_spread(positions: Array, normals: Array, distance: float) -> Array:

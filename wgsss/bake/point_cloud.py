@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wgsss.bake.octree import Octree, morton, octree
 from wgsss.bake.samples import Samples, count, subdivided
-from wgsss.cache import Arrays, KeyPart, cached
+from wgsss.cache import Arrays, cached
 from wgsss.errors import InputError, Note
 from wgsss.scene.mesh import Mesh
 
@@ -57,9 +57,8 @@ def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
         samples, tree = _make(mesh, spacing)
         return {f.name: getattr(part, f.name) for part in (samples, tree) for f in fields(part)}
 
-    key: list[KeyPart] = [mesh.positions, mesh.faces, spacing]
     label = f"spreading {mesh.area / spacing**2:.0f} samples over {mesh.name}"
-    arrays = cached("point_cloud", key, make, code=[Mesh, Samples, Octree], label=label)
+    arrays = cached("point_cloud", [mesh, spacing], make, label=label)
     samples = Samples(**{f.name: arrays[f.name] for f in fields(Samples)})
     tree = Octree(**{f.name: arrays[f.name] for f in fields(Octree)})
     return PointCloud(samples, tree, float(np.sqrt(mesh.area / len(samples.face))))

@@ -48,7 +48,7 @@ def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: 
         return {"visible": np.concatenate(parts)}
 
     key = [vertices, faces, pixels, positions, normals]
-    return cached("sky", key, make, code=[rays.Caster], label="casting rays at the sky")["visible"]
+    return cached("sky", key, make, label="casting rays at the sky")["visible"]
 
 
 def _triangles(scene: Scene) -> tuple[Array, Array]:

@@ -58,9 +58,8 @@ def local_thickness(mesh: Mesh, profile: Profile) -> Array:
                 found[block, channel] = let_through.mean(axis=1)
         return {"thickness": smoothed(mesh, found)}
 
-    key = [mesh.positions, mesh.faces, distances, falls]
     label = f"measuring the thickness at {len(mesh.positions)} vertices"
-    return cached("thickness", key, make, code=[Mesh, rays.Caster], label=label)["thickness"]
+    return cached("thickness", [mesh, profile], make, label=label)["thickness"]
 
 
 def falloff(profile: Profile, d: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -50,14 +51,14 @@ def unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
 
     Raises InputError where the mesh has no face with an area.
     """
-    key = [mesh.positions, mesh.faces, mesh.corner_normals, mesh.corner_uvs, mesh.corner_colors, library()]
+    key = [mesh, library(), version(library()), gpu.name]
 
     def make() -> Arrays:
         render_mesh = _unwrap(gpu, mesh)
         return {f.name: getattr(render_mesh, f.name) for f in fields(RenderMesh)}
 
     label = f"unwrapping {len(mesh.faces)} faces"
-    return RenderMesh(**cached("unwrap", key, make, code=[Mesh, new_atlas, "bake/atlas_faces"], label=label))
+    return RenderMesh(**cached("unwrap", key, make, label=label))
 
 
 def split(mesh: Mesh) -> RenderMesh:

@@ -18,7 +18,7 @@ from wgsss import frame as shared
 from wgsss import wgsl
 from wgsss.bake.point_cloud import PointCloud as Cloud
 from wgsss.bake.point_cloud import point_cloud
-from wgsss.cache import Arrays, KeyPart, cached
+from wgsss.cache import Arrays, cached
 from wgsss.frame import Frame
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
@@ -37,7 +37,6 @@ sharp where light should have spread.
 """
 _CLOSEST = 0.02  # of that distance: closer, R_d is level
 _MANTISSA, _EXPONENT = 9, 5  # bits of the table's entries
-_PROBES = np.geomspace(1e-3, 1e2, 64)  # mm: where profiles are compared
 _NO_AREA = 1e-30  # mm^2, of samples of a body that has been scaled to nothing: the middle of none is not defined
 _BEYOND = 1e-5  # share of the light that is left out for being far
 
@@ -213,8 +212,7 @@ def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     def make() -> Arrays:
         return vars(_kernel(profile, blunt, size))
 
-    key: list[KeyPart] = [profile.total, profile.reflectance(_PROBES), blunt, size]
-    return Kernel(**cached("point-cloud-kernel", key, make, code=[type(profile), _GATHER]))
+    return Kernel(**cached("point-cloud-kernel", [profile, blunt, size], make))
 
 
 def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:

@@ -4,37 +4,25 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.environment import prefilter
 from wgsss.bake.samples import Samples
-from wgsss.bake.sky import sky_visibility
-from wgsss.bake.suns import take_suns
-from wgsss.cache import Arrays, KeyPart, cached
-from wgsss.emitters import emitters
+from wgsss.cache import Arrays, cached
 from wgsss.errors import Note
 from wgsss.frame import Frame, begin
 from wgsss.graph import Graph
 from wgsss.optics import Profile
 from wgsss.reference.convergence import converged
 from wgsss.reference.estimate import Estimate, Reference
-from wgsss.reference.kernel import make_kernel
-from wgsss.reference.surface_sum import surface_sum
 from wgsss.stage import Body, Stage
 
 Array = npt.NDArray[Any]
 
 TOLERANCE, SAMPLES = 0.01, 1_000_000
-_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
-_CODE = (
-    *(Stage, Samples, begin, emitters, prefilter, take_suns, sky_visibility, converged, make_kernel, surface_sum),
-    *("reference/integral", "reference/integral_receivers", "frame/irradiance_points", "frame/shadow"),
-    *("frame/rho_dt", "frame/prefilter_irradiance"),
-)
 
 
 @dataclass(frozen=True)
@@ -127,21 +115,17 @@ def at_vertices(
 
 
 def _cached(
-    stage: Stage, profiles: Mapping[int, Profile], settings: Sequence[KeyPart], make: Callable[[], Arrays]
+    stage: Stage, profiles: Mapping[int, Profile], settings: Sequence[object], make: Callable[[], Arrays]
 ) -> Arrays:
     """What `make` gives for the scene as posed; its notes are warnings, now and whenever it comes from the cache."""
     scene = stage.scene
-    key: list[KeyPart] = [stage.gpu.name, repr(scene.camera), repr(scene.lights), *settings]
-    key += [light.pixels() for light in stage.environments()]
-    for body in stage.bodies:
-        material = body.material
-        surface = (material.roughness, material.eta, material.specular, material.base_color, material.color_after)
-        key += [repr(surface), *vars(material.maps).values(), body.rest.matrix, body.rest.mesh.positions]
-        key += [body.mesh.positions, body.mesh.faces, body.mesh.corner_normals, body.mesh.corner_uvs]
-        key.append(body.mesh.corner_colors)
-    for index, profile in profiles.items():
-        key += [index, profile.total, profile.reflectance(_PROBES)]
-    found = cached("integral", key, make, code=_CODE)
+    # M depends neither on how the picture is shown nor on `transport`. The notes contain the names.
+    skies = [light.pixels() for light in stage.environments()]
+    names = [(body.material.name, body.mesh.name) for body in stage.bodies]
+    still = [replace(body.rest, motion=None, material=replace(body.material, transport=None)) for body in stage.bodies]
+    posed = [body.mesh for body in stage.bodies]
+    key = [stage.gpu.name, scene.camera, scene.lights, skies, names, still, posed, profiles, settings]
+    found = cached("integral", key, make)
     for note in filter(None, found["notes"].tolist()):
         warnings.warn(note, Note, stacklevel=3)
     return found

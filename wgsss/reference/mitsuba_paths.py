@@ -90,8 +90,7 @@ class Paths:
             seed = ((2 * channel + scatters) << 24) + (number << 6)
             order = {"paths": paths, "seed": seed}
             key = [*self._content, xml, *order.values()]
-            code = (mitsuba_render.main,)
-            found = cached("volume", key, lambda xml=xml, order=order: self._ask(xml, order), code=code)  # type: ignore[misc]
+            found = cached("volume", key, lambda xml=xml, order=order: self._ask(xml, order))  # type: ignore[misc]
             first += paths * found["mean"]
             second += paths * found["square"]
             bar.update(paths)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,8 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.octree import morton
-from wgsss.cache import KeyPart, cached
+from wgsss.cache import cached
+from wgsss.fingerprint import fingerprint
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
 from wgsss.reference.kernel import Kernel
@@ -60,8 +60,8 @@ def surface_sum(
 
 
 def _part(source: _Source, receivers: Points, bar: Any) -> dict[str, Array]:
-    key: list[KeyPart] = [source.digest, receivers.position, receivers.normal, source.gpu.name]
-    return cached("integral-part", key, lambda: source.summed(receivers, bar), code=[_MODULE])
+    key = [source.fingerprint, receivers, source.gpu.name]
+    return cached("integral-part", key, lambda: source.summed(receivers, bar))
 
 
 class _Source:
@@ -81,9 +81,7 @@ class _Source:
         flux[self.count :] = 0.0
         value = {"position": samples.position[order], "normal": samples.normal[order], "flux": flux}
         packed = self.samples_layout.pack(value)
-        digest = hashlib.sha256(packed)
-        digest.update(kernel.table.tobytes() + bytes([kernel.first & 255, kernel.first >> 8]))
-        self.digest = digest.digest()
+        self.fingerprint = fingerprint([kernel, packed])
         step = _TILE * self.samples_layout.size
         self.tiles = [gpu.buffer(packed[at : at + step]) for at in range(0, len(packed), step)]
         self.table = gpu.buffer(kernel.table)

@@ -66,7 +66,7 @@ class Material:
     Raises InputError naming the field that is out of range, and for the medium also the material and the channel.
     """
 
-    name: str
+    name: str = field(metadata={"fingerprint": False})
     sigma_a: Triple | None = None
     """absorption, 1/mm"""
     sigma_s_prime: Triple | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,7 +33,7 @@ class Mesh:
     """float32 (F, 3, 3) unit normals per corner, or None where the surface is smooth"""
     corner_uvs: Array | None = None
     """float32 (F, 3, 2), u to the right and v down, or None"""
-    name: str = "mesh"
+    name: str = field(default="mesh", metadata={"fingerprint": False})
     corner_colors: Array | None = None
     """float32 (F, 3, 3), linear, multiply the base colour, or None"""
     shrunk: bool = False

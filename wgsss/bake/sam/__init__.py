@@ -8,33 +8,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from wgsss.bake.rays import Caster
-from wgsss.bake.sam.fan_quadrature import Fans
-from wgsss.bake.sam.fans import fan_areas
-from wgsss.bake.sam.fit.batched_nnls import batched_nnls
-from wgsss.bake.sam.fit.candidates import candidates
-from wgsss.bake.sam.fit.neighbour_mixture import neighbour_mixture
-from wgsss.bake.sam.fit.omp import omp
-from wgsss.bake.sam.fit.refit import refit
 from wgsss.bake.sam.fit.select import RECEIVERS_PER_SECOND_ROW, select_fit
-from wgsss.bake.sam.fit.smoothed_means import smoothed_means
-from wgsss.bake.sam.fit.training import training_lights
-from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.full_tree import full_tree
 from wgsss.bake.sam.mesh_checks import topology_warning
-from wgsss.bake.sam.patch_form_factors import PatchFormFactors
-from wgsss.bake.sam.point_tree import point_tree
-from wgsss.bake.sam.published.blocks import Blocks, Bounds
 from wgsss.bake.sam.published.coarse import select_coarse
-from wgsss.bake.sam.published.top import largest_form_factors, select_top
-from wgsss.bake.sam.receiver_patches import ReceiverPatches
+from wgsss.bake.sam.published.top import select_top
 from wgsss.bake.sam.sender_map import ENTRY_BYTES, MIXTURE_BYTES, SenderMap
-from wgsss.bake.sam.sender_tree import sender_tree
-from wgsss.cache import Arrays, KeyPart, cached
+from wgsss.cache import Arrays, cached
 from wgsss.errors import InputError, Note, unknown
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
@@ -51,49 +34,6 @@ SELECTIONS: dict[str, Callable[[Gpu, Mesh, Profile, int], SenderMap]] = {
 
 MAX_BYTES = 1 << 30
 """largest size of a map"""
-_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: distances at which R_d is part of the cache key
-_TOP = (
-    SenderMap,
-    fan_areas,
-    Fans,
-    FormFactors,
-    Blocks,
-    Bounds,
-    point_tree,
-    largest_form_factors,
-    "sam/form_factors",
-    "sam/top",
-)
-_PATCHES = (
-    SenderMap,
-    fan_areas,
-    Fans,
-    FormFactors,
-    PatchFormFactors,
-    ReceiverPatches,
-    sender_tree,
-    point_tree,
-    "sam/form_factors",
-)
-_CODE: dict[str, tuple[Any, ...]] = {
-    "top": _TOP,
-    "coarse": _TOP,
-    "fit": (
-        *_PATCHES,
-        candidates,
-        smoothed_means,
-        neighbour_mixture,
-        batched_nnls,
-        omp,
-        refit,
-        training_lights,
-        Caster,
-        "sam/blends",
-        "sam/mix",
-    ),
-    "full_tree": (*_PATCHES, select_fit),
-}
-"""Functions and classes whose modules, and WGSL modules, on which each kind of map depends."""
 
 
 def spatial_adjacency_map(gpu: Gpu, mesh: Mesh, profile: Profile, entries_per_vertex: int, select: str) -> SenderMap:
@@ -137,8 +77,7 @@ def _cached(
         note = topology_warning(mesh)
         return {**choose(gpu, mesh, profile, *count).arrays(), "note": np.array(note)}
 
-    key: list[KeyPart] = [mesh.positions, mesh.faces, profile.total, profile.reflectance(_PROBES), *count]
-    arrays = cached("sam", [*key, name, gpu.name], make, code=(choose, topology_warning, *_CODE[name]))
+    arrays = cached("sam", [mesh, profile, *count, name, gpu.name], make)
     if note := str(arrays["note"]):
         warnings.warn(f"{mesh.name}: {note}", Note, stacklevel=3)
     return SenderMap.from_arrays(arrays)

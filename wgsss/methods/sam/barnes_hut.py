@@ -19,7 +19,7 @@ from wgsss import frame as shared
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.bake.sam.patch_form_factors import NEAR_ORDER, near_pairs
-from wgsss.cache import Arrays, KeyPart, cached
+from wgsss.cache import Arrays, cached
 from wgsss.frame import Frame
 from wgsss.graph import Graph, Handle
 from wgsss.methods.sam.deform import deforming, posed
@@ -31,8 +31,6 @@ Array = npt.NDArray[Any]
 _LEVELS = 16  # of wgsl/sam/sum.wgsl: 4^16 vertices
 _FINE = 0.05  # in place of OPENING, by which totals at rest are exact
 _MOST = 16.0  # of a scale: what hardly anything reaches tells little
-_PROBES = np.geomspace(1e-4, 1e3, 512)  # mm: where profiles are compared
-_CODE = (FormFactors, fan_areas, near_pairs, deforming, "sam/form_factors", "sam/sum")
 
 
 def sum_behind(frame: Frame, body: Body, plan: Plan, points: Any, last: Any, kept: float) -> Handle:
@@ -92,5 +90,5 @@ def _scale(body: Body, plan: Plan) -> Array:
         scale[:, :3] = np.clip((total + more) / np.maximum(taken, 1e-30), 0.0, _MOST)
         return {"scale": scale}
 
-    key: list[KeyPart] = [mesh.positions, mesh.faces, tree.order, profile.reflectance(_PROBES), gpu.name]
-    return cached("sam-scale", key, make, code=_CODE, label="summing all form factors at rest")["scale"]
+    key = [mesh, profile, plan.entries, gpu.name]
+    return cached("sam-scale", key, make, label="summing all form factors at rest")["scale"]
