@@ -36,7 +36,7 @@ def image() -> Image:
     return Image(pixels, display, aovs, {}, "", graph, {"method": "deon07", "adapter": "a driver"})
 
 
-def test_png_is_what_a_display_shows(image: Image, tmp_path: Path) -> None:
+def test_png_holds_the_image_for_a_display(image: Image, tmp_path: Path) -> None:
     assert save(image, tmp_path / "a.png") == [tmp_path / "a.png"]
     with Picture.open(tmp_path / "a.png") as picture:
         np.testing.assert_array_equal(np.asarray(picture), image.display)
@@ -71,7 +71,7 @@ def test_exr_holds_linear_channels_layers_and_metadata(image: Image, tmp_path: P
     assert header["wgsss.method"] == "deon07"
 
 
-def test_npy_holds_linear_pixels_with_the_extra_outputs_beside(image: Image, tmp_path: Path) -> None:
+def test_npy_holds_linear_pixels_and_extra_outputs_are_files_beside_it(image: Image, tmp_path: Path) -> None:
     written = save(image, tmp_path / "a.npy")
     assert written == [tmp_path / name for name in ("a.npy", "a.irradiance.npy", "a.depth.npy", "a.normal.npy")]
     assert set(tmp_path.iterdir()) == set(written)
@@ -80,9 +80,7 @@ def test_npy_holds_linear_pixels_with_the_extra_outputs_beside(image: Image, tmp
     assert np.isfinite(np.load(tmp_path / "a.depth.npy")).all()
 
 
-def test_film_has_even_sides_the_colours_of_the_display_and_black_where_nothing_is_seen(
-    image: Image, tmp_path: Path
-) -> None:
+def test_a_film_has_even_sides_display_colours_and_a_black_background(image: Image, tmp_path: Path) -> None:
     display = np.full((HEIGHT, WIDTH, 4), (200, 90, 40, 255), np.uint8)
     display[:, 4:, 3] = 0
     frame = replace(image, display=display)
@@ -98,7 +96,7 @@ def test_film_has_even_sides_the_colours_of_the_display_and_black_where_nothing_
 
 
 @pytest.mark.parametrize("name", ["a.PNG", "a.EXR", "a.NPY", "a.Npy", "a.MP4", "a.b.Exr"])
-def test_extensions_in_capitals_write_the_same_and_leave_nothing_else(image: Image, tmp_path: Path, name: str) -> None:
+def test_extensions_in_capitals_write_the_same_files(image: Image, tmp_path: Path, name: str) -> None:
     written = save(image, tmp_path / name)
     assert set(tmp_path.iterdir()) == set(written)
     plain = (tmp_path / "plain").with_suffix(Path(name).suffix.lower())
@@ -109,7 +107,7 @@ def test_extensions_in_capitals_write_the_same_and_leave_nothing_else(image: Ima
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.PNG", "a.exr", "a.NPY", "a.MP4"])
-def test_a_disk_that_fails_leaves_nothing(
+def test_a_failing_disk_leaves_no_files(
     image: Image, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: Any) -> None:
@@ -121,7 +119,7 @@ def test_a_disk_that_fails_leaves_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_png_in_a_folder_named_like_an_archive(image: Image, tmp_path: Path) -> None:
+def test_a_png_can_be_in_a_folder_named_like_an_archive(image: Image, tmp_path: Path) -> None:
     (tmp_path / "a.zip").mkdir()
     save(image, tmp_path / "a.zip" / "a.png")
     assert [path.name for path in (tmp_path / "a.zip").iterdir()] == ["a.png"]
@@ -135,7 +133,9 @@ def test_frames_are_numbered_from_one(image: Image, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.npy", "a.mp4"])
 @pytest.mark.parametrize("where", ["pixels", "aovs"])
-def test_numbers_that_are_not_finite_are_never_written(image: Image, tmp_path: Path, name: str, where: str) -> None:
+def test_images_with_numbers_that_are_not_finite_are_not_written(
+    image: Image, tmp_path: Path, name: str, where: str
+) -> None:
     (image.pixels if where == "pixels" else image.aovs["irradiance"])[2, 3, 1] = np.nan
     (tmp_path / name).write_text("before")
     with pytest.raises(RenderError, match="not finite"):
@@ -143,7 +143,7 @@ def test_numbers_that_are_not_finite_are_never_written(image: Image, tmp_path: P
     assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
 
 
-def test_what_fails_on_the_way_leaves_the_old_files(tmp_path: Path) -> None:
+def test_a_failed_write_keeps_the_old_files(tmp_path: Path) -> None:
     paths = [tmp_path / "a", tmp_path / "b"]
     paths[0].write_text("before")
     with pytest.raises(InputError, match="cannot be written"), replacing(*paths) as (one, two):
@@ -153,7 +153,7 @@ def test_what_fails_on_the_way_leaves_the_old_files(tmp_path: Path) -> None:
     assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
 
 
-def test_a_film_that_fails_on_the_way_is_not_there(image: Image, tmp_path: Path) -> None:
+def test_a_failed_film_leaves_no_file(image: Image, tmp_path: Path) -> None:
     def frames() -> Any:
         yield image
         raise KeyboardInterrupt
@@ -174,14 +174,14 @@ def test_a_film_that_fails_on_the_way_is_not_there(image: Image, tmp_path: Path)
         ("/proc/a.png", "/proc/a.png: cannot be written"),
     ],
 )
-def test_places_that_cannot_be_written_are_told_beforehand(tmp_path: Path, path: str, said: str) -> None:
+def test_paths_that_cannot_be_written_are_errors_beforehand(tmp_path: Path, path: str, said: str) -> None:
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(InputError, match=said):
         check_output(tmp_path / path)
     assert [found.name for found in tmp_path.iterdir()] == ["folder.png"]
 
 
-def test_an_interrupt_leaves_no_trial_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_leaves_no_temporary_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(path: Path) -> None:
         open(path, "x").close()
         raise KeyboardInterrupt
@@ -200,7 +200,7 @@ def test_files_have_the_permissions_of_any_new_file(image: Image, tmp_path: Path
 
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize("kind", ["folder", "fifo", "link to a device"])
-def test_what_is_no_file_is_not_replaced(tmp_path: Path, suffix: str, kind: str) -> None:
+def test_a_path_that_is_not_a_regular_file_is_not_replaced(tmp_path: Path, suffix: str, kind: str) -> None:
     path = tmp_path / f"a{suffix}"
     if kind == "folder":
         path.mkdir()
@@ -213,14 +213,14 @@ def test_what_is_no_file_is_not_replaced(tmp_path: Path, suffix: str, kind: str)
     assert list(tmp_path.iterdir()) == [path] and not path.is_file()
 
 
-def test_a_frame_whose_place_is_taken_is_not_written(image: Image, tmp_path: Path) -> None:
+def test_a_frame_does_not_replace_a_folder(image: Image, tmp_path: Path) -> None:
     (tmp_path / "a.0002.png").mkdir()
     with pytest.raises(InputError, match=r"0002\.png: this is a folder"):
         save_frames([image, image], tmp_path / "a.png")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.0001.png", "a.0002.png"]
 
 
-def test_names_may_be_as_long_as_the_file_system_has_them(image: Image, tmp_path: Path) -> None:
+def test_names_may_have_the_greatest_length_of_the_file_system(image: Image, tmp_path: Path) -> None:
     assert save(image, tmp_path / f"{'x' * 251}.png")[0].exists()
     with pytest.raises(InputError, match=r"cannot be written \(File name too long"):
         save(image, tmp_path / f"{'y' * 250}.npy")

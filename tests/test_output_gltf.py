@@ -44,7 +44,7 @@ def scene(**fields: Any) -> Scene:
     return Scene("test", **{"objects": (thing,), "lights": (), "camera": CAMERA, **fields})
 
 
-def again(given: Scene, path: Path) -> Contents:
+def round_trip(given: Scene, path: Path) -> Contents:
     return read_gltf(export(given, path / "scene.glb"))
 
 
@@ -60,9 +60,9 @@ def pixels(texture: Texture | None) -> Any:
     return np.array(Image.open(io.BytesIO(texture.source)))
 
 
-def test_a_mesh_comes_back_where_it_was(tmp_path: Path) -> None:
+def test_a_mesh_keeps_its_position(tmp_path: Path) -> None:
     given = scene()
-    contents = again(given, tmp_path)
+    contents = round_trip(given, tmp_path)
     assert placed(contents) == pytest.approx(given.objects[0].placed[FACES], rel=1e-6)
     (part,) = contents.parts
     assert len(part.positions) == 4 and part.uvs == {} and part.normals is not None
@@ -70,11 +70,11 @@ def test_a_mesh_comes_back_where_it_was(tmp_path: Path) -> None:
     assert contents.notes == ()
 
 
-def test_seams_hard_edges_and_vertex_colours_come_back(tmp_path: Path) -> None:
+def test_seams_hard_edges_and_vertex_colours_are_preserved(tmp_path: Path) -> None:
     normals = Mesh(POSITIONS, FACES).face_normals
     normals = np.repeat(normals[:, None] / np.linalg.norm(normals, axis=1)[:, None, None], 3, axis=1)
     mesh = Mesh(POSITIONS, FACES, normals, UVS, corner_colors=1 - UVS[..., [0, 0, 1]])
-    contents = again(scene(mesh=mesh), tmp_path)
+    contents = round_trip(scene(mesh=mesh), tmp_path)
     (part,) = contents.parts
     assert placed(contents) == pytest.approx(scene(mesh=mesh).objects[0].placed[FACES], rel=1e-6)
     assert part.uvs[0][part.faces] == pytest.approx(UVS)
@@ -83,9 +83,9 @@ def test_seams_hard_edges_and_vertex_colours_come_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, material in MATERIALS.items() if material.sigma_a is not None])
-def test_a_medium_comes_back(tmp_path: Path, name: str) -> None:
+def test_a_medium_is_preserved(tmp_path: Path, name: str) -> None:
     material = replace(MATERIALS[name], base_color=(0.9, 0.8, 0.7), roughness=0.25, specular=0.75)
-    look = again(scene(material=material), tmp_path).parts[0].look
+    look = round_trip(scene(material=material), tmp_path).parts[0].look
     assert look.medium is not None
     assert np.array(look.medium.sigma_a) / 1000 == pytest.approx(material.sigma_a, rel=1e-4)
     assert np.array(look.medium.sigma_s_prime) / 1000 == pytest.approx(material.sigma_s_prime, rel=1e-4)
@@ -93,11 +93,11 @@ def test_a_medium_comes_back(tmp_path: Path, name: str) -> None:
     assert look.base_color == pytest.approx((0.9, 0.8, 0.7))
 
 
-def test_textures_come_back(tmp_path: Path) -> None:
+def test_textures_are_preserved(tmp_path: Path) -> None:
     color = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     maps = Maps(color, 255 - color, color[..., 0] * 10, ("clamp", "mirror"), nearest=True, normal_scale=0.5)
     given = scene(mesh=Mesh(POSITIONS, FACES, corner_uvs=UVS), material=replace(MATERIALS["skin1"], maps=maps))
-    contents = again(given, tmp_path)
+    contents = round_trip(given, tmp_path)
     look = contents.parts[0].look
     assert np.array_equal(pixels(look.base_color_map), color)
     assert np.array_equal(pixels(look.normal_map), 255 - color) and look.normal_scale == 0.5
@@ -108,15 +108,15 @@ def test_textures_come_back(tmp_path: Path) -> None:
     assert contents.notes == ()
 
 
-def test_lights_come_back_and_others_are_named(tmp_path: Path) -> None:
+def test_lights_are_preserved_and_unsupported_ones_are_named(tmp_path: Path) -> None:
     lights = (
         DirectionalLight((0, -3, 0), (1, 2, 0)),
         DirectionalLight((1, 2, 3), (0, 0, 0)),
         PointLight((10, 20, 30), (4, 5, 6)),
         SphereLight((0, 0, 0), 1, (1, 1, 1)),
     )
-    with pytest.warns(UserWarning, match=r"^test: the glTF file differs: SphereLight is left out$"):
-        found = again(scene(lights=lights), tmp_path).lights
+    with pytest.warns(UserWarning, match=r"^test: the glTF file differs from the scene: SphereLight is left out$"):
+        found = round_trip(scene(lights=lights), tmp_path).lights
     assert [light.kind for light in found] == ["directional", "directional", "point"]
     assert found[0].direction == pytest.approx((0, -1, 0)) and found[0].power == pytest.approx((1, 2, 0))
     assert found[1].direction == pytest.approx(np.array((1, 2, 3)) / np.sqrt(14)) and found[1].power == (0, 0, 0)
@@ -124,8 +124,8 @@ def test_lights_come_back_and_others_are_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("camera", [CAMERA, OrthographicCamera((0, 0, 300), (0, 0, 0), height=80)])
-def test_the_camera_comes_back(tmp_path: Path, camera: Any) -> None:
-    (found,) = again(scene(camera=camera), tmp_path).cameras
+def test_the_camera_is_preserved(tmp_path: Path, camera: Any) -> None:
+    (found,) = round_trip(scene(camera=camera), tmp_path).cameras
     assert np.array(found.eye) * 1000 == pytest.approx(camera.eye, abs=1e-9)
     gaze = np.subtract(camera.target, camera.eye)
     assert found.forward == pytest.approx(gaze / np.linalg.norm(gaze))
@@ -137,24 +137,24 @@ def test_the_camera_comes_back(tmp_path: Path, camera: Any) -> None:
 
 
 def test_a_material_without_coefficients_is_written_without_a_medium(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="'skin' has no coefficients, and so no medium"):
-        look = again(scene(material=MATERIALS["skin"]), tmp_path).parts[0].look
+    with pytest.warns(UserWarning, match="'skin' has no coefficients, so that it has no medium"):
+        look = round_trip(scene(material=MATERIALS["skin"]), tmp_path).parts[0].look
     assert look.medium is None and look.base_color == pytest.approx((0.63, 0.44, 0.34)) and look.eta == 1.4
 
 
-def test_a_mesh_that_has_no_size_now_is_left_out(tmp_path: Path) -> None:
+def test_a_mesh_without_size_is_left_out(tmp_path: Path) -> None:
     gone = Object(Mesh(POSITIONS * 0, FACES, name="gone", shrunk=True), MATERIALS["marble"])
-    with pytest.warns(UserWarning, match="gone is left out, for it has no size now"):
-        assert len(again(scene(objects=(gone, *scene().objects)), tmp_path).parts) == 1
+    with pytest.warns(UserWarning, match="gone is left out, because it has no size at this time"):
+        assert len(round_trip(scene(objects=(gone, *scene().objects)), tmp_path).parts) == 1
 
 
-def test_what_gltf_has_no_place_for_is_told(tmp_path: Path) -> None:
+def test_a_warning_names_what_gltf_cannot_represent(tmp_path: Path) -> None:
     material = Material("odd", sigma_a=(1, 1, 1), sigma_s_prime=(1, 1, 1), color_after=0.5)
     with pytest.warns(UserWarning, match="color_after and transport are left out; exposure and bloom are left out"):
-        again(scene(material=material, exposure=1), tmp_path)
+        round_trip(scene(material=material, exposure=1), tmp_path)
 
 
-def test_nothing_is_written_where_it_cannot_be(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     for path, message in ((tmp_path / "a.gltf", "extension must be .glb"), (tmp_path / "none" / "a.glb", "no folder")):
         with pytest.raises(InputError, match=message):
             export(scene(), path)

@@ -1,6 +1,6 @@
-"""Images to files: PNG and MP4 for a display, EXR and NPY for measuring.
+"""Writing of images to files: PNG and MP4 for a display, EXR and NPY with linear radiance.
 
-A file appears whole or not at all: it is written under another name in the same folder, then renamed.
+A file is written under a temporary name in the same folder and then renamed, so that it appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -28,44 +28,44 @@ Array = npt.NDArray[Any]
 
 FORMATS = (".png", ".exr", ".npy", ".mp4")
 LINEAR_FORMATS = (".exr", ".npy")
-"""those that hold linear radiance, and the extra outputs beside it"""
+"""The formats that hold linear radiance and the extra outputs."""
 DEFAULT_FPS = 25.0
 
-_AXES = {"depth": "Z", "normal": "XYZ"}  # the EXR channels of extra outputs that are not RGB
+_AXES = {"depth": "Z", "normal": "XYZ"}  # EXR channels of the extra outputs that are not RGB
 
 
 def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
-    """The path, if a file with one of these extensions, in capitals or not, can be written there; to be asked before
-    anything that takes long.
+    """Return the path if a file can be written there. To be called before work that takes long.
 
-    Raises InputError for another extension, a folder that is missing, and a place that cannot be written.
+    Raises InputError if the file extension, in upper or lower case, is not one of `formats`, if the folder is missing,
+    or if it cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in formats:
         raise InputError(f"{path}: the file extension must be {' or '.join(formats)}")
-    with _told(path):
-        _check_place(path)
+    with _naming_path(path):
+        _check_target(path)
         if not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder '{path.parent}'")
-        trial = _temporary(path)  # permissions do not tell everything, so try
+        trial = _temporary(path)  # permissions alone do not decide whether a file can be written
         try:
             trial.touch()
-        finally:  # also where an interrupt comes in between
+        finally:  # also after an interrupt
             trial.unlink(missing_ok=True)
     return path
 
 
 @contextmanager
 def replacing(*paths: Path) -> Iterator[list[Path]]:
-    """Temporary files to write to, which take the places of `paths` when the block ends and vanish if it fails.
+    """Yield temporary files that replace `paths` when the block ends, and are deleted if it fails.
 
-    Raises InputError where the file system refuses.
+    Raises InputError if the file system refuses to write.
     """
     temporary = [_temporary(path) for path in paths]
     try:
-        with _told(paths[0]):
+        with _naming_path(paths[0]):
             for path in paths:
-                _check_place(path)
+                _check_target(path)
             yield temporary
             for source, path in zip(temporary, paths, strict=True):
                 os.replace(source, path)
@@ -74,19 +74,20 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
             source.unlink(missing_ok=True)
 
 
-def _check_place(path: Path) -> None:
-    """Raise InputError where a file would take the place of what is none: a folder, a device, a link to one."""
+def _check_target(path: Path) -> None:
+    """Raise InputError if the path exists and is not a regular file, such as a folder or a device."""
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: this is {'a folder' if path.is_dir() else 'not a regular file'}")
 
 
 def _temporary(path: Path) -> Path:
-    """A name of its own for this process, as short as any name may need it."""
+    """Return a short temporary name that is unique to this process, also for names of the greatest allowed length."""
     return path.with_name(f".{zlib.crc32(os.fsencode(path.name)):08x}.{os.getpid()}{path.suffix}")
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _naming_path(path: Path) -> Iterator[None]:
+    """Turn an OSError in the block into an InputError that names the path."""
     try:
         yield
     except OSError as error:
@@ -94,16 +95,18 @@ def _told(path: Path) -> Iterator[None]:
 
 
 def save(image: Image, path: str | Path) -> list[Path]:
-    """Write an image, and give back the files written.
+    """Write an image, and return the files written. The file extension selects the content.
 
-    The extension says what they hold. `.png`: what a display shows, with coverage in alpha. `.exr`: linear radiance as
-    float32 channels R, G, B and A (coverage), and the image's extra outputs as layers (`irradiance.R`, `depth.Z`,
-    `normal.X`). `.npy`: the same radiance, float32 (H, W, 4), and beside it `<name>.depth.npy` and so on.
-    `.mp4`: a film of this frame. `depth` is 0 where nothing is seen. PNG and EXR carry the image's metadata under
-    `wgsss.<key>`.
+    - `.png`: the image for a display, with coverage in alpha.
+    - `.exr`: linear radiance as float32 channels R, G, B and A (coverage), and the extra outputs as layers
+      (`irradiance.R`, `depth.Z`, `normal.X`).
+    - `.npy`: linear radiance and coverage, float32 (H, W, 4). Extra outputs go to `<name>.depth.npy` etc.
+    - `.mp4`: a film of this frame.
 
-    Raises InputError where a file cannot be written, and RenderError where a number is not finite: such an image is
-    never written.
+    `depth` is 0 where no object is seen. PNG and EXR contain the image's metadata under `wgsss.<key>`.
+
+    Raises InputError if a file cannot be written, and RenderError if a number is not finite: such an image is never
+    written.
     """
     path = check_output(path)
     if path.suffix.lower() == ".mp4":
@@ -112,13 +115,13 @@ def save(image: Image, path: str | Path) -> list[Path]:
 
 
 def _write(image: Image, path: Path) -> list[Path]:
-    """One frame, to a place that was checked."""
+    """Write one frame to a path that was checked."""
     layers = _layers(image)
     if path.suffix.lower() == ".npy":
         paths = [path, *(path.with_name(f"{path.stem}.{name}{path.suffix}") for name in layers)]
         with replacing(*paths) as files:
             for file, values in zip(files, [image.pixels, *layers.values()], strict=True):
-                with file.open("wb") as opened:  # to a name that does not end in .npy, such as .NPY, numpy adds it
+                with file.open("wb") as opened:  # numpy would add .npy to a name that ends in .NPY
                     np.save(opened, np.asarray(values, np.float32))
         return paths
     with replacing(path) as (file,):
@@ -127,9 +130,9 @@ def _write(image: Image, path: Path) -> list[Path]:
 
 
 def save_frames(images: Iterable[Image], path: str | Path, fps: float = DEFAULT_FPS) -> list[Path]:
-    """Write frames as they come: to one `.mp4`, `fps` frames per second, or to `<name>.0001.png` and so on.
+    """Write frames as they are rendered, to one `.mp4` of `fps` frames per second or to `<name>.0001.png` etc.
 
-    Raises what `save` raises; the frames before it stay, but a film appears whole or not at all.
+    Raises as `save`. Frames already written stay, but a film appears whole or not at all.
     """
     path = check_output(path)
     if path.suffix.lower() == ".mp4":
@@ -141,7 +144,7 @@ def save_frames(images: Iterable[Image], path: str | Path, fps: float = DEFAULT_
 
 
 def _layers(image: Image) -> dict[str, Array]:
-    """The extra outputs, fit to be written. Raises RenderError where one, or the image, is not finite."""
+    """Return the extra outputs with finite depth. Raises RenderError if an output or the image is not finite."""
     layers = dict(image.aovs)
     if "depth" in layers:
         layers["depth"] = np.where(image.pixels[..., 3:] > 0, layers["depth"], 0.0)
@@ -163,7 +166,7 @@ def _write_png(image: Image, layers: dict[str, Array], file: Path) -> None:
     text = PngInfo()
     for key, value in _labels(image).items():
         text.add_text(key, value)
-    with file.open("wb") as opened:  # imageio looks for archives and addresses in names
+    with file.open("wb") as opened:  # imageio interprets some names as archives or addresses
         iio.imwrite(opened, np.ascontiguousarray(image.display), extension=".png", plugin="pillow", pnginfo=text)
 
 
@@ -176,7 +179,7 @@ def _write_exr(image: Image, layers: dict[str, Array], file: Path) -> None:
             channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., i], np.float32)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **_labels(image)}
     try:
-        with OpenEXR.File(header, channels) as exr, io.BytesIO() as stream:  # it takes no name that is not text
+        with OpenEXR.File(header, channels) as exr, io.BytesIO() as stream:  # OpenEXR refuses names that are not text
             exr.write(stream)
             file.write_bytes(stream.getvalue())
     except RuntimeError as error:
@@ -184,47 +187,47 @@ def _write_exr(image: Image, layers: dict[str, Array], file: Path) -> None:
 
 
 def _save_video(images: Iterable[Image], path: Path, fps: float) -> Path:
-    """H.264 with 4:2:0 chroma, which every player reads; black where nothing is seen and beyond an odd edge."""
+    """Write a film in H.264 with 4:2:0 chroma, which every player supports. Pixels without an object are black."""
     encoder: subprocess.Popen[bytes] | None = None
-    with replacing(path) as (file,), tempfile.TemporaryFile() as said:
+    with replacing(path) as (file,), tempfile.TemporaryFile() as messages:
         try:
             for image in images:
                 _layers(image)
                 picture = _even(image.display)
-                encoder = encoder or _encoder(file, picture.shape[1], picture.shape[0], fps, said)
+                encoder = encoder or _encoder(file, picture.shape[1], picture.shape[0], fps, messages)
                 encoder.stdin.write(picture.tobytes())  # type: ignore[union-attr]
             if encoder is None:
                 raise InputError(f"{path}: a film needs at least one frame")
             encoder.stdin.close()  # type: ignore[union-attr]
-            failed = encoder.wait() != 0
+            has_failed = encoder.wait() != 0
         except BrokenPipeError:
-            failed = True
+            has_failed = True
         finally:
             if encoder is not None and encoder.poll() is None:
                 encoder.kill()
                 encoder.wait()
-        if failed:
-            said.seek(0)
-            raise OSError(" ".join(said.read().decode(errors="replace").split()) or "ffmpeg failed")
+        if has_failed:
+            messages.seek(0)
+            raise OSError(" ".join(messages.read().decode(errors="replace").split()) or "ffmpeg failed")
     return path
 
 
-def _encoder(file: Path, width: int, height: int, fps: float, said: IO[bytes]) -> subprocess.Popen[bytes]:
-    """A process that makes a film of the 24-bit RGB frames written to it."""
+def _encoder(file: Path, width: int, height: int, fps: float, messages: IO[bytes]) -> subprocess.Popen[bytes]:
+    """Start an encoder process that reads 24-bit RGB frames from its standard input."""
     import imageio_ffmpeg
 
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:.6g}", "-i", "-"]
-    # Without these marks players take small films to be BT.601 and show other colours.
-    marks = [part for name in ("colorspace", "color_primaries", "color_trc") for part in (f"-{name}", "bt709")]
-    target = ["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", "scale=out_color_matrix=bt709", *marks]
-    place = ["-movflags", "+faststart", "-f", "mp4", f"file:{file}"]
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *source, *target, *place]
-    # In a session of its own, so that an interrupt from the keyboard reaches only us.
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said, start_new_session=True)
+    # Without these tags, players assume BT.601 for small films and show wrong colours.
+    tags = [part for name in ("colorspace", "color_primaries", "color_trc") for part in (f"-{name}", "bt709")]
+    target = ["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", "scale=out_color_matrix=bt709", *tags]
+    container = ["-movflags", "+faststart", "-f", "mp4", f"file:{file}"]
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *source, *target, *container]
+    # A separate session, so that an interrupt from the keyboard does not reach the encoder.
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages, start_new_session=True)
 
 
 def _even(display: Array) -> Array:
-    """uint8 (H, W, 3) with H and W even, from (H, W, 4) with coverage, over black."""
+    """Composite an image (H, W, 4) over black, and pad it to even sides: uint8 (H, W, 3)."""
     height, width, _ = display.shape
     picture = np.zeros((height + height % 2, width + width % 2, 3), np.uint8)
     picture[:height, :width] = np.round(display[..., :3] * (display[..., 3:] / 255.0))

@@ -1,7 +1,7 @@
-"""A scene as a glTF file, for other programs: meshes, materials with their media, lights and the camera.
+"""The export of a scene as a glTF file: meshes, materials with their media, lights and the camera.
 
 Lengths become metres, the unit of glTF, and coefficients 1/m. Radiometry becomes the photometry of
-KHR_lights_punctual one to one: 1 W/m^2 is written as 1 lx and 1 W/sr as 1 cd, as the reader takes them.
+KHR_lights_punctual one to one: 1 W/m^2 is written as 1 lx and 1 W/sr as 1 cd. The reader does the reverse.
 """
 
 from __future__ import annotations
@@ -29,31 +29,31 @@ Array = npt.NDArray[Any]
 FORMATS = (".glb",)
 _LIGHTS = "KHR_lights_punctual"
 _PER_MM = 1e-3
-"""metres"""
+"""Metres per millimetre."""
 
 
 def export(scene: Scene, path: str | Path, aspect: float = 1.0) -> Path:
-    """Write `scene`, as it stands, to a .glb file, and give back its path.
+    """Write `scene` as posed to a .glb file, and return its path.
 
-    `aspect` is the width of the image over its height, which glTF wants of an orthographic camera. What glTF has no
-    place for is told in one warning. Raises InputError for a place that cannot be written.
+    `aspect` is the width of the image over its height, which glTF requires for an orthographic camera. One warning
+    names everything that glTF cannot represent. Raises InputError if the file cannot be written.
     """
     path = check_output(path, FORMATS)
     data, notes = glb(scene, aspect)
     with replacing(path) as (file,):
         file.write_bytes(data)
     if notes:
-        warnings.warn(f"{scene.name}: the glTF file differs: {'; '.join(notes)}", Note, stacklevel=2)
+        warnings.warn(f"{scene.name}: the glTF file differs from the scene: {'; '.join(notes)}", Note, stacklevel=2)
     return path
 
 
 def glb(scene: Scene, aspect: float = 1.0) -> tuple[bytes, list[str]]:
-    """The .glb file of a scene, and notes on what of it glTF has no place for."""
+    """Return the bytes of a .glb file, and notes about what glTF cannot represent."""
     writer, notes = Writer(f"wgsss {__version__}"), dict[str, None]()
     nodes = []
     for thing in scene.objects:
         if thing.mesh.shrunk:
-            notes[f"{thing.mesh.name} is left out, for it has no size now"] = None
+            notes[f"{thing.mesh.name} is left out, because it has no size at this time"] = None
             continue
         material = writer.add("materials", _material(writer, thing.material, _depth(thing.mesh), notes))
         mesh = writer.add("meshes", {"name": thing.mesh.name, "primitives": [_primitive(writer, thing.mesh, material)]})
@@ -66,26 +66,26 @@ def glb(scene: Scene, aspect: float = 1.0) -> tuple[bytes, list[str]]:
 
 
 def _placed(matrix: Array) -> dict[str, Any]:
-    """A node's field for a placement (4, 4) in mm."""
+    """Return the field of a node for a placement (4, 4) in mm."""
     matrix = matrix.copy()
     matrix[:3, 3] *= _PER_MM
     return {} if np.array_equal(matrix, np.eye(4)) else {"matrix": matrix.T.ravel().tolist()}
 
 
 def _depth(mesh: Mesh) -> float:
-    """About how thick a mesh is, m: its shortest side, a hundredth of its longest at least."""
+    """Estimate the thickness of a mesh, m: its shortest side, but at least a hundredth of its longest side."""
     sides = np.ptp(mesh.bounds.astype(np.float64), axis=0)
     return float(max(sides.min(), sides.max() / 100)) * _PER_MM
 
 
 def _primitive(writer: Writer, mesh: Mesh, material: int) -> dict[str, Any]:
-    """The triangles of a mesh, its vertices split where corners have normals or texture coordinates of their own."""
+    """Write the triangles of a mesh. Vertices are split where the normals or texture coordinates of corners differ."""
     vertex = mesh.faces.ravel()
-    apart = [vertex.astype(np.uint64)]
+    columns = [vertex.astype(np.uint64)]
     for values in (mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors):
         if values is not None:
-            apart += list(np.ascontiguousarray(values + np.float32(0)).view(np.uint32).reshape(len(vertex), -1).T)
-    first, indices = _distinct(apart)
+            columns += list(np.ascontiguousarray(values + np.float32(0)).view(np.uint32).reshape(len(vertex), -1).T)
+    first, indices = _distinct(columns)
     at = vertex[first]
     attributes = {
         "POSITION": writer.rows((mesh.positions[at].astype(np.float64) * _PER_MM).astype(np.float32), bounds=True),
@@ -100,7 +100,10 @@ def _primitive(writer: Writer, mesh: Mesh, material: int) -> dict[str, Any]:
 
 
 def _distinct(columns: list[Array]) -> tuple[Array, Array]:
-    """The first of each of the distinct rows of some columns of whole numbers (N,), and for each row which it is."""
+    """Find the distinct rows of integer columns (N,).
+
+    Returns the index at which each of them occurs first, and for every row the number of its distinct row.
+    """
     key = columns[0]
     for column in columns[1:]:
         other = np.unique(column, return_inverse=True)[1]
@@ -118,7 +121,7 @@ def _material(writer: Writer, material: Material, depth: float, notes: dict[str,
         map_ = {"specularTexture": textures["specular"]} if "specular" in textures else {}
         extensions |= writer.extended("KHR_materials_specular", {"specularFactor": material.specular, **map_})
     if material.sigma_a is None or material.sigma_s_prime is None:
-        notes[f"'{material.name}' has no coefficients, and so no medium"] = None
+        notes[f"'{material.name}' has no coefficients, so that it has no medium"] = None
     else:
         sigma_a, sigma_s = (np.array(sigma) / _PER_MM for sigma in (material.sigma_a, material.sigma_s_prime))
         volume, scatter = written(sigma_a, sigma_s)
@@ -129,14 +132,14 @@ def _material(writer: Writer, material: Material, depth: float, notes: dict[str,
     if material.color_after != 1 or material.transport is not None:
         notes["color_after and transport are left out"] = None
     pbr = {"metallicFactor": 0.0, "roughnessFactor": material.roughness, **_named("baseColor", [*factor, 1.0], color)}
-    found = {"name": material.name, "pbrMetallicRoughness": pbr, "extensions": extensions}
+    fields = {"name": material.name, "pbrMetallicRoughness": pbr, "extensions": extensions}
     if "normal" in textures:
-        found["normalTexture"] = {**textures["normal"], "scale": material.maps.normal_scale}
-    return found
+        fields["normalTexture"] = {**textures["normal"], "scale": material.maps.normal_scale}
+    return fields
 
 
 def _textures(writer: Writer, maps: Maps) -> dict[str, dict[str, Any]]:
-    """The textures that a material has, by their slots. The specular one is the alpha of a white image."""
+    """Write the textures of a material, and return them by slot. The specular map is the alpha of a white image."""
     images = {slot: getattr(maps, slot) for slot in SLOTS if getattr(maps, slot) is not None}
     if not images:
         return {}
@@ -148,13 +151,13 @@ def _textures(writer: Writer, maps: Maps) -> dict[str, dict[str, Any]]:
 
 
 def _named(name: str, factor: list[float], texture: dict[str, Any]) -> dict[str, Any]:
-    """A factor and its texture, if any, under their names in glTF."""
+    """Return a factor and its texture, if there is one, under their names in glTF."""
     return {f"{name}Factor": factor, **{f"{name}{key}": value for key, value in texture.items()}}
 
 
 def _lights(writer: Writer, lights: tuple[Light, ...], notes: dict[str, None]) -> list[int]:
-    """The nodes of directional and point lights; others are noted."""
-    found, nodes = [], []
+    """Write directional and point lights, and return their nodes. Other lights are noted."""
+    entries, nodes = [], []
     for light in lights:
         matrix = np.eye(4)
         if isinstance(light, DirectionalLight):
@@ -166,16 +169,16 @@ def _lights(writer: Writer, lights: tuple[Light, ...], notes: dict[str, None]) -
             continue
         intensity = max(power)
         color = [value / intensity for value in power] if intensity else [1.0, 1.0, 1.0]
-        found.append({"type": kind, "intensity": intensity, "color": color})
-        extensions = writer.extended(_LIGHTS, {"light": len(found) - 1})
+        entries.append({"type": kind, "intensity": intensity, "color": color})
+        extensions = writer.extended(_LIGHTS, {"light": len(entries) - 1})
         nodes.append(writer.add("nodes", {"extensions": extensions, **_placed(matrix)}))
-    if found:
-        writer.put(_LIGHTS, {"lights": found})
+    if entries:
+        writer.put(_LIGHTS, {"lights": entries})
     return nodes
 
 
 def _looking(direction: Array) -> Array:
-    """A rotation (3, 3) that takes -z to a direction."""
+    """Return a rotation (3, 3) that maps -z to a direction."""
     back = -direction / np.linalg.norm(direction)
     side = np.cross(np.eye(3)[np.argmin(np.abs(back))], back)
     side /= np.linalg.norm(side)
@@ -183,7 +186,7 @@ def _looking(direction: Array) -> Array:
 
 
 def _camera(writer: Writer, scene: Scene, aspect: float) -> int:
-    """The node of the camera, whose clipping planes hold the whole scene."""
+    """Write the camera, and return its node. The whole scene lies between its clipping planes."""
     camera = scene.camera
     matrix = np.linalg.inv(camera.view())
     size = float(np.linalg.norm(np.ptp(scene.bounds, axis=0)))

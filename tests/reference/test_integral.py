@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from wgsss.methods import make_method
 from wgsss.optics import SKIN_GAUSSIANS, NormalizedDiffusion, Profile, SumOfGaussians
 from wgsss.reference import REFERENCES, convergence, surface_sum
 from wgsss.reference import integral as reference
-from wgsss.reference.convergence import at_spacing, irradiance_at
+from wgsss.reference.convergence import Converged, irradiance_at, sum_at_spacing
 from wgsss.reference.integral import Integral, at_vertices, integral
 from wgsss.reference.kernel import BLUR, RADIUS, Kernel, make_kernel
 from wgsss.rendering import Renderer
@@ -54,7 +53,7 @@ class Bar:
         self.n += n
 
 
-def scattered(mesh: Mesh, count: int, seed: int = 0) -> Samples:
+def random_points(mesh: Mesh, count: int, seed: int = 0) -> Samples:
     """Random places on a mesh."""
     rng = np.random.default_rng(seed)
     faces = rng.integers(0, len(mesh.faces), count).astype(np.int32)
@@ -73,7 +72,7 @@ def distances(kernel: Kernel) -> Any:
 
 @pytest.mark.parametrize("profile", [WIDE, SKIN_GAUSSIANS, BURLEY, material("skin1").profile])
 @pytest.mark.parametrize("spacing", [0.1, 1.0])
-def test_a_kernel_holds_all_light(profile: Profile, spacing: float) -> None:
+def test_a_kernel_conserves_the_total_reflectance(profile: Profile, spacing: float) -> None:
     """Over the plane: what is taken as near, against a quadrature, and with what is sampled the total."""
     kernel, radius = make_kernel(profile, spacing, 1e9), RADIUS * spacing
     for channel in range(3):
@@ -91,7 +90,7 @@ def test_a_kernel_holds_all_light(profile: Profile, spacing: float) -> None:
     np.testing.assert_array_equal(kernel.table[len(r) - 1 :: len(r)], 0)
 
 
-def test_what_is_sampled_is_blurred_over_the_plane() -> None:
+def test_the_sampled_part_is_blurred_over_the_plane() -> None:
     """Against a blur of an image of it."""
     spacing, step = 1.0, 1 / 30
     x = np.arange(-240, 241) * step
@@ -106,7 +105,7 @@ def test_what_is_sampled_is_blurred_over_the_plane() -> None:
     np.testing.assert_allclose(found[near], blurred[near], rtol=0.01, atol=1e-4 * image.max())
 
 
-def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
+def test_sums_are_those_of_maisch_and_ropinski_eq_5_13_and_14(gpu: Gpu) -> None:
     """70,000 samples, more than lavapipe's loops turn, in a box wider than the profile's range. On a lattice and along
     its axes, many lie in a receiver's plane and at right angles to it: neither is behind it."""
     rng = np.random.default_rng(1)
@@ -138,7 +137,7 @@ def test_sums_are_those_of_eq_5_13_and_14(gpu: Gpu) -> None:
     np.testing.assert_array_equal(found, again)
 
 
-def test_uniformly_lit_sphere(gpu: Gpu) -> None:
+def test_a_uniformly_lit_sphere(gpu: Gpu) -> None:
     """A chord r away, a sphere has the area 2 pi r dr; what is opposed begins at sqrt(2) a. Moved and turned."""
     a, at = 3.0, (30.0, -5.0, 2.0)
     ball = Object(shapes.sphere(a, vertices=1500), replace(SOFT, specular=1.0), translate=at, rotate=(20, 30, 40))
@@ -160,7 +159,7 @@ def test_uniformly_lit_sphere(gpu: Gpu) -> None:
 
 
 @pytest.mark.parametrize(("thickness", "vertices"), [(2.0, 6000), (0.3, 3000)])
-def test_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> None:
+def test_a_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> None:
     """The thin one is thinner than the radius within which samples give way to a plane: its far face must not."""
     below = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=2)
     up = DirectionalLight((0, 1, 0), (2.0, 2.0, 2.0))
@@ -169,7 +168,7 @@ def test_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> 
     places = Samples(*_under(scene.objects[0].mesh, thickness / 2))
     spacing = 0.5
     assert (RADIUS * spacing > thickness) == (thickness == 0.3)
-    found = at_spacing(stage.bodies[0], places, np.zeros((len(places.face), 3)), WIDE, spacing)
+    found = sum_at_spacing(stage.bodies[0], places, np.zeros((len(places.face), 3)), WIDE, spacing)
     np.testing.assert_array_equal(found.front, 0)
     expected = 2.0 * WIDE.total * WIDE.beyond(thickness)
     np.testing.assert_allclose(found.back, np.broadcast_to(expected, found.back.shape), rtol=0.01)
@@ -185,7 +184,7 @@ def _under(mesh: Mesh, height: float) -> tuple[Any, Any, Any]:
 
 
 @pytest.mark.parametrize("profile", [SKIN_GAUSSIANS, BURLEY], ids=["skin", "burley"])
-def test_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
+def test_a_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
     """By a base colour applied before diffusion, white beyond a straight edge: two spacings away from it M is the
     integral of the line spread function. Skin's narrowest Gaussian is narrower than samples are apart, Burley's profile
     has no limit at 0."""
@@ -196,12 +195,12 @@ def test_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
     striped = replace(MATTE, color_after=0.0, maps=replace(MATTE.maps, base_color=color))
     stage = Stage(gpu, lit(SUN, mesh=plane(side), material=striped))
     body = stage.bodies[0]
-    places = scattered(body.mesh, 4000)
+    places = random_points(body.mesh, 4000)
     x = body.at(places).position
     keep = (np.abs(x[:, 2]) < 3) & (np.abs(x[:, 0] - edge) < 2) & (np.abs(x[:, 0] - edge) > 2 * spacing)
     places = Samples(places.face[keep], places.barycentric[keep], places.share[keep])
     x = x[keep, 0].astype(float) - edge
-    found = at_spacing(body, places, irradiance_at(body, places), profile, spacing)
+    found = sum_at_spacing(body, places, irradiance_at(body, places), profile, spacing)
     t = np.geomspace(1e-9, 12, 4000)
     spread = profile.line_spread(t)
     half = np.concatenate([[[0, 0, 0]], np.cumsum(0.5 * (spread[1:] + spread[:-1]) * np.diff(t)[:, None], axis=0)])
@@ -218,9 +217,9 @@ def test_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
 def test_error_falls_faster_than_the_spacing(gpu: Gpu, profile: Profile) -> None:
     mesh = shapes.sphere(5.0, vertices=250)
     stage = Stage(gpu, lit(PointLight((0, 30, 5), (1e-3, 1e-3, 1e-3)), mesh=mesh, material=SOFT))
-    body, places = stage.bodies[0], scattered(mesh, 200)
+    body, places = stage.bodies[0], random_points(mesh, 200)
     L_d = irradiance_at(body, places)
-    *coarse, exact = (at_spacing(body, places, L_d, profile, spacing) for spacing in (1.0, 0.5, 0.25, 0.1))
+    *coarse, exact = (sum_at_spacing(body, places, L_d, profile, spacing) for spacing in (1.0, 0.5, 0.25, 0.1))
     wanted = exact.front + exact.back
     errors = np.array([rms(found.front + found.back - wanted) / rms(wanted) for found in coarse])
     assert (errors[-1] < 0.005).all()
@@ -243,7 +242,7 @@ def test_base_colour_and_a_profile_of_another_kind(gpu: Gpu) -> None:
     assert (back == 0).all()
 
 
-def test_light_stays_in_the_object_it_entered(gpu: Gpu) -> None:
+def test_light_stays_in_the_object_that_it_enters(gpu: Gpu) -> None:
     """A plane half a millimetre below a lit one, in its shadow."""
     below = OrthographicCamera((0, -50, 0), (0, 0, 0), up=(0, 0, -1), height=4)
     hidden = Object(plane(20, y=-0.5), SOFT)
@@ -272,7 +271,7 @@ def test_each_object_has_its_own_profile(gpu: Gpu) -> None:
     assert (found.M[0] == 0).all()
 
 
-def test_what_is_interrupted_goes_on(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_interrupted_sum_continues(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
     monkeypatch.setattr(surface_sum, "_PART", 1)  # a part for each workgroup
     stage = Stage(gpu, lit(SUN, mesh=shapes.sphere(5.0, vertices=250), material=SOFT))
@@ -304,10 +303,10 @@ def test_what_is_interrupted_goes_on(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, 
     assert done
 
 
-def test_says_when_it_must_stop_too_early(gpu: Gpu) -> None:
+def test_a_limit_on_the_samples_gives_a_warning(gpu: Gpu) -> None:
     stage = Stage(gpu, lit(SUN, mesh=shapes.sphere(5.0, vertices=250), material=SOFT))
     for _ in range(2):  # and again when the result comes from the cache
-        with pytest.warns(UserWarning, match=r"white on sphere: M still moves by .* from \d+ to \d+ samples"):
+        with pytest.warns(UserWarning, match=r"white on sphere: M still changes by .* from \d+ to \d+ samples"):
             found = integral(stage, (16, 16), tolerance=1e-5, samples=20_000)
     assert 0 < found.error.max() < 0.1 * found.M.max()
     with pytest.warns(UserWarning, match="mm apart, too far for the material"):
@@ -318,14 +317,14 @@ def test_says_when_it_must_stop_too_early(gpu: Gpu) -> None:
     assert rms(loose.error[loose.M[..., 0] > 0]).max() < 0.05 * rms(loose.M[loose.M[..., 0] > 0]).max()
 
 
-def test_anything_that_matters_is_another_entry(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_every_input_changes_the_cache_key(gpu: Gpu, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
     calls = []
 
-    def stub(body: Any, receivers: Samples, *settings: Any) -> SimpleNamespace:
+    def stub(body: Any, receivers: Samples, *settings: Any) -> Converged:
         calls.append(settings)
         nothing = np.zeros((len(receivers.face), 3))
-        return SimpleNamespace(front=nothing, back=nothing, error=nothing, note="")
+        return Converged(front=nothing, back=nothing, error=nothing, note="")
 
     monkeypatch.setattr(reference, "converged", stub)
     finger = Object(shapes.capsule(vertices=500), SOFT, motion=BendAndSwell())
@@ -359,10 +358,10 @@ def test_anything_that_matters_is_another_entry(gpu: Gpu, monkeypatch: pytest.Mo
     assert len(calls) == before + 6
 
 
-def test_irradiance_of_many_places_comes_in_turns(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_irradiance_of_many_points_is_gathered_in_parts(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = shapes.sphere(5.0, vertices=250)
     stage = Stage(gpu, lit(SUN, mesh=mesh, material=SOFT))
-    body, places = stage.bodies[0], scattered(mesh, 250)
+    body, places = stage.bodies[0], random_points(mesh, 250)
     at_once = irradiance_at(body, places)
     monkeypatch.setattr(convergence, "_POINTS", 100)
     np.testing.assert_array_equal(irradiance_at(body, places), at_once)
@@ -370,7 +369,7 @@ def test_irradiance_of_many_places_comes_in_turns(gpu: Gpu, monkeypatch: pytest.
     np.testing.assert_allclose(at_once[:, 0], expected, atol=0.05)
 
 
-def test_goes_where_methods_go(gpu: Gpu) -> None:
+def test_the_integral_can_be_used_like_a_method(gpu: Gpu) -> None:
     assert REFERENCES["integral"] is Integral
     method = make_method("integral", {"tolerance": "0.05", "samples": "20000"})
     assert isinstance(method, Integral) and (method.tolerance, method.samples) == (0.05, 20_000)

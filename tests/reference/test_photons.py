@@ -139,7 +139,7 @@ def test_half_spaces_of_chandrasekhar(gpu, albedo):
         within(photons.total, photons.total_error, [half_space(a, sky=sky) for a in albedo])
 
 
-def test_light_far_away_where_nothing_absorbs(gpu):
+def test_light_far_away_without_absorption(gpu):
     """What diffuses there came from a depth of H(1) / sqrt(3) mean free paths, beyond the extrapolated boundary."""
     photons = trace([Layer((0, 0, 0), (1, 2, 5), 1.0)], 50_000, gpu=gpu)
     np.testing.assert_allclose(photons.total, 1, rtol=1e-12)
@@ -150,7 +150,7 @@ def test_light_far_away_where_nothing_absorbs(gpu):
         assert beyond.mean() == pytest.approx(depth / paths, abs=3 * np.sqrt(depth / paths / 150_000))
 
 
-def test_leaps_through_a_thick_slab(gpu):
+def test_photons_leap_through_a_thick_slab(gpu):
     """Through a slab that absorbs nothing goes the depth above over the slab's, between extrapolated boundaries."""
     small, thickness = 1e-8, 56.0
     depth = (1 - half_space(1 - small)) / np.sqrt(small) / np.sqrt(3)
@@ -225,7 +225,7 @@ def test_specular_reflection(gpu, eta, specular):
     assert trace([layer], 1, sky=True, gpu=gpu).specular == pytest.approx(of_sky, abs=2e-3)
 
 
-def test_energy_closes(slab, skin):
+def test_energy_is_conserved(slab, skin):
     for photons in (slab, skin):
         np.testing.assert_allclose(photons.balance, 1, rtol=0, atol=1e-5)
     assert np.all(skin.total_transmittance == 0)
@@ -242,7 +242,7 @@ def test_results_are_reproducible(gpu, monkeypatch):
         assert np.any(getattr(first, name) != getattr(other, name))
 
 
-def test_errors_are_those_of_repetition(gpu):
+def test_standard_errors_match_the_spread_of_repetitions(gpu):
     runs = [trace([SLAB], 5_000, seed=seed, gpu=gpu) for seed in range(40)]
     for name in ("total", "total_transmittance"):
         found = np.array([getattr(run, name) for run in runs])
@@ -255,7 +255,7 @@ def test_errors_are_those_of_repetition(gpu):
     assert np.all(np.isinf(trace([SLAB], 1, gpu=gpu).total_error))
 
 
-def test_a_layer_cut_in_two_is_one_layer(gpu, slab):
+def test_a_layer_split_in_two_gives_the_same_result(gpu, slab):
     cut = [Layer(SLAB.sigma_a, SLAB.sigma_s_prime, 1.0, thickness=t, g=SLAB.g) for t in (0.07, 0.13)]
     photons = trace(cut, 100_000, seed=1, gpu=gpu)
     for name in ("total", "total_transmittance"):
@@ -301,7 +301,7 @@ def made(skin) -> tuple[Photons, Dipole]:
     return Photons(edges, R, none, 2 * R, none, outside, 2 * outside, zero, zero, zero, 0.0, 1), dipole
 
 
-def test_counts_are_read_as_a_profile(made):
+def test_counts_can_be_used_as_a_profile(made):
     photons, dipole = made
     np.testing.assert_allclose(photons.total, dipole.total, rtol=1e-9)
     np.testing.assert_allclose(photons.total_transmittance, 2 * dipole.total, rtol=1e-9)
@@ -331,7 +331,7 @@ def test_counts_are_exact_at_edges(skin):
     np.testing.assert_allclose(Profile.beyond(skin, 0.5), skin.beyond(0.5), rtol=0.01)
 
 
-def test_bad_input_is_told(gpu):
+def test_invalid_input_is_an_error(gpu):
     for arguments, says in (
         ({"photons": 0}, "photons must be a whole number from 1"),
         ({"photons": 1.5}, "photons must be a whole number"),

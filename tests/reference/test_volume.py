@@ -21,7 +21,7 @@ from wgsss.reference import mitsuba_paths
 from wgsss.reference.integral import integral
 from wgsss.reference.mitsuba_paths import Paths, newest_llvm
 from wgsss.reference.mitsuba_scene import export
-from wgsss.reference.mitsuba_xml import described
+from wgsss.reference.mitsuba_xml import scene_xml
 from wgsss.reference.photons import trace
 from wgsss.reference.volume import Volume, _rays
 from wgsss.rendering import Renderer
@@ -60,7 +60,7 @@ def ball(*lights, medium: Material = MATCHED, camera=CAMERA, mesh: Mesh = BALL) 
 
 
 def xml(scene: Scene, **rest) -> ElementTree.Element:
-    return ElementTree.fromstring(described(scene, (64, 48), **rest))
+    return ElementTree.fromstring(scene_xml(scene, (64, 48), **rest))
 
 
 def value(element: ElementTree.Element, name: str) -> list[float]:
@@ -72,7 +72,7 @@ def value(element: ElementTree.Element, name: str) -> list[float]:
 # The files.
 
 
-def test_meshes_stand_where_they_stand_in_the_world(tmp_path):
+def test_meshes_are_written_in_world_space(tmp_path):
     """Read back, a mesh has its placed positions and its own normals, hard edges too."""
     plate = Object(shapes.slab((8, 6, 2), 200), MATCHED, translate=(1, 2, 3), rotate=(20, 30, 40))
     with pytest.warns(UserWarning, match="through the air"):
@@ -123,7 +123,7 @@ def test_no_path_ends_by_chance_while_it_carries_light():
 
 
 @pytest.mark.parametrize(("channel", "integrator", "bsdf"), [(None, "volpathmis", "diffuse"), (1, "volpath", "null")])
-def test_lamps_let_light_through_where_the_integrator_can(channel, integrator, bsdf):
+def test_lights_let_other_light_through_if_the_integrator_supports_it(channel, integrator, bsdf):
     """Found with Mitsuba 3.9: behind a lamp without a boundary, volpathmis counts the sky twice."""
     root = xml(ball(SKY, LIGHTS["sphere"]), channel=channel)
     assert root.find("integrator").attrib["type"] == integrator
@@ -134,7 +134,7 @@ def test_lamps_let_light_through_where_the_integrator_can(channel, integrator, b
         assert value(lamp, "reflectance") == [0, 0, 0]
 
 
-def test_environments_add_up(tmp_path):
+def test_environments_are_summed(tmp_path):
     """Mitsuba has one: constants go into one, and into the image where there is one."""
     import OpenEXR
 
@@ -157,12 +157,12 @@ SUN, LAMP = DirectionalLight((0, 0, -1), (1, 1, 1)), PointLight((0, 0, 50), (1, 
     [
         (ball(SKY, medium=material("skin")), "not gaussians"),
         (ball(SKY, mesh=OPEN), "the mesh has holes"),
-        (ball(SUN, medium=replace(MATCHED, eta=1.3, roughness=0.02)), "smooth boundary of 'matched'.*finite light"),
+        (ball(SUN, medium=replace(MATCHED, eta=1.3, roughness=0.02)), "smooth boundary of 'matched'.*light with a size"),
         (ball(LAMP, medium=replace(MATCHED, eta=1.3, roughness=0.02)), "smooth boundary"),
         (ball(EnvironmentLight(file="a.exr"), EnvironmentLight(file="b.exr")), "one environment image"),
     ],
 )
-def test_refused(scene, why, tmp_path):
+def test_scenes_that_mitsuba_cannot_represent_are_errors(scene, why, tmp_path):
     with pytest.raises(InputError, match=why) as caught:
         export(scene, tmp_path / "new", (8, 8))
     assert "\n" not in str(caught.value)
@@ -174,7 +174,7 @@ def test_smooth_boundary_under_finite_lights_is_fine(tmp_path):
     export(ball(SUN), tmp_path, (8, 8))
 
 
-def told(scene: Scene, folder) -> str:
+def warning_of(scene: Scene, folder) -> str:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         export(scene, folder, (8, 8))
@@ -182,19 +182,19 @@ def told(scene: Scene, folder) -> str:
     return str(caught[0].message) if caught else ""
 
 
-def test_what_is_not_shared_is_told_in_one_line(tmp_path):
+def test_one_warning_names_all_differences(tmp_path):
     texture = np.zeros((2, 2, 3), np.uint8)
     wears = replace(MATCHED, eta=1.3, base_color=(0.5, 1, 1), specular=0.5, maps=Maps(texture, texture))
-    message = told(ball(SKY, medium=wears), tmp_path)
+    message = warning_of(ball(SKY, medium=wears), tmp_path)
     for word in ("base colours", "base colour textures", "normal maps", "specular", "facets"):
         assert word in message
     assert "through the air" not in message  # a ball is convex
-    assert "through the air" in told(SCENES["gyroid"](None), tmp_path)
-    assert told(ball(SKY), tmp_path) == told(ball(LIGHTS["rect"]), tmp_path) == ""
-    assert "lamps hide" in told(ball(SKY, LIGHTS["rect"]), tmp_path)
+    assert "through the air" in warning_of(SCENES["gyroid"](None), tmp_path)
+    assert warning_of(ball(SKY), tmp_path) == warning_of(ball(LIGHTS["rect"]), tmp_path) == ""
+    assert "lights hide" in warning_of(ball(SKY, LIGHTS["rect"]), tmp_path)
 
 
-def test_folder_that_cannot_be_made(tmp_path):
+def test_a_folder_that_cannot_be_created_is_an_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="this is not a folder"):
         export(ball(SKY), tmp_path / "file" / "folder", (8, 8))
@@ -216,7 +216,7 @@ def test_rays_go_through_the_middles_of_pixels(kind):
     assert origin[2] == pytest.approx(5)
 
 
-def test_batches_add_up_and_begin_alike(monkeypatch):
+def test_batches_sum_to_the_samples_and_begin_alike(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: True)
     monkeypatch.setattr("importlib.metadata.version", lambda name: "3")
     with Paths(ball(SKY), (8, 8), np.zeros((10_000, 6))) as paths:
@@ -228,7 +228,7 @@ def test_batches_add_up_and_begin_alike(monkeypatch):
 
 def test_newest_llvm(monkeypatch, tmp_path):
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
-    monkeypatch.setattr(mitsuba_paths, "_LLVM_PLACES", (f"{tmp_path}/libLLVM*",))
+    monkeypatch.setattr(mitsuba_paths, "_LLVM_PATTERNS", (f"{tmp_path}/libLLVM*",))
     (tmp_path / "libLLVM-15.so.1").touch()
     assert newest_llvm() is None
     for name in ("libLLVM-17.so", "libLLVM.so.19.1", "libLLVM-C.so"):
@@ -366,7 +366,7 @@ def _about_y(degrees):
 
 @needs_mitsuba
 @pytest.mark.parametrize("by", ["llvm", "scalar"])
-def test_ball_that_absorbs_nothing(gpu, monkeypatch, by):
+def test_a_ball_without_absorption(gpu, monkeypatch, by):
     """Under a uniform sky L, what entered leaves: M = pi L, less what went straight through, exp(-sigma_t d) on a line
     of sight of length d inside. And within its standard error."""
     if by == "scalar":
@@ -396,7 +396,7 @@ def test_ball_that_absorbs_nothing(gpu, monkeypatch, by):
 
 
 @needs_mitsuba
-def test_smooth_ball_that_absorbs_nothing(gpu):
+def test_a_smooth_ball_without_absorption(gpu):
     """Under a uniform sky it is as bright as the sky, whichever way it is seen, and L_0 is what it reflects: M = pi L
     times the base colour."""
     white = replace(MATCHED, eta=1.4, roughness=0.02, sigma_s_prime=(2.0, 2.0, 2.0), base_color=(1.0, 0.5, 0.25))
@@ -425,7 +425,7 @@ def test_slab_of_photons(gpu):
     leaving, variance = np.zeros((2, 10, 3))
     with Paths(scene, (8, 8), rays) as paths, tqdm(disable=True) as bar:
         for channel in range(3):
-            leaving[:, channel], variance[:, channel] = paths.follow(channel, True, samples, bar)
+            leaving[:, channel], variance[:, channel] = paths.trace(channel, True, samples, bar)
     share = 2 * math.pi * np.tile(weights * mu, 2)[:, None] / light
     found = (share * leaving).reshape(2, 5, 3).sum(axis=1)
     error = np.sqrt((share**2 * variance).reshape(2, 5, 3).sum(axis=1))
@@ -475,11 +475,11 @@ def test_exported_scene_renders_as_it_is(mi, tmp_path):
 
 
 @needs_mitsuba
-def test_mitsuba_that_fails_says_why(gpu, monkeypatch):
+def test_an_error_of_mitsuba_is_reported(gpu, monkeypatch):
     monkeypatch.setattr(mitsuba_paths, "newest_llvm", lambda: None)
     scene = ball(SKY)
     with Paths(scene, (8, 8), np.zeros((1, 6))) as paths, tqdm(disable=True) as bar:
         paths._variant = "nonsense"
-        with pytest.raises(RenderError, match=r"Mitsuba: it ended: .*nonsense") as caught, pytest.warns(UserWarning):
-            paths.follow(0, True, 2, bar)
+        with pytest.raises(RenderError, match=r"Mitsuba: the process ended: .*nonsense") as caught, pytest.warns(UserWarning):
+            paths.trace(0, True, 2, bar)
     assert "\n" not in str(caught.value)

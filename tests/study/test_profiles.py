@@ -13,7 +13,7 @@ from wgsss.errors import InputError
 from wgsss.optics import Dipole, Layer, Multipole, NormalizedDiffusion, Tabulated
 from wgsss.scene import MATERIALS, Material
 from wgsss.study.profile_plot import plot
-from wgsss.study.profiles import MODELS, Case, default_models, described, distances_for, profiles
+from wgsss.study.profiles import MODELS, Case, default_models, distances_for, profile_json, profiles
 
 SKIN1 = MATERIALS["skin1"]
 TWO = [Layer((0.005,) * 3, (1.3,) * 3, 1.4, thickness=6.0), Layer((0.01,) * 3, (1.0,) * 3, 1.4)]
@@ -37,13 +37,13 @@ def test_the_default_models_of_a_material(case, wanted):
     r = distances_for(found)
     assert r.shape == (64,) and np.all(np.diff(r) > 0)
     for name, profile in found.items():
-        row = described(name, profile, r, case.k)
+        row = profile_json(name, profile, r, case.k)
         assert np.shape(row["R"]) == (64, 3)
         assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
 def test_the_numbers_of_a_profile_are_its_values():
-    row = described("dipole", SKIN1.profile, np.array([0.1, 1.0]), 4)
+    row = profile_json("dipole", SKIN1.profile, np.array([0.1, 1.0]), 4)
     skin = Dipole(SKIN1.sigma_a, SKIN1.sigma_s_prime, 1.3)
     np.testing.assert_array_equal(row["R"], skin.reflectance([0.1, 1.0]))
     np.testing.assert_allclose(row["total"], [0.43596, 0.22733, 0.13100], atol=1e-5)
@@ -62,7 +62,7 @@ def test_a_slab_transmits():
     found = profiles(Case(SKIN1, thickness=3.0), ["multipole", "layers"])
     slab = Multipole(SKIN1.sigma_a, SKIN1.sigma_s_prime, 1.3, thickness=3.0)
     for name, profile in found.items():
-        row = described(name, profile, np.array([0.5, 2.0]), 6)
+        row = profile_json(name, profile, np.array([0.5, 2.0]), 6)
         np.testing.assert_allclose(row["T"], slab.transmittance([0.5, 2.0]), rtol=1e-6)
         np.testing.assert_allclose(row["total_T"], slab.total_transmittance, rtol=1e-9)
 
@@ -124,7 +124,7 @@ def test_a_thickness_needs_coefficients():
 def test_an_infinite_value_is_an_error():
     burley = profiles(Case(SKIN1), ["burley"])["burley"]
     with pytest.raises(InputError, match="'burley' is infinite at r = 0 mm"):
-        described("burley", burley, np.array([1.0, 0.0]), 6)
+        profile_json("burley", burley, np.array([1.0, 0.0]), 6)
 
 
 def test_every_model_has_a_description():

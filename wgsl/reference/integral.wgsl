@@ -1,17 +1,17 @@
 // M by brute force: the sum of R_d(|x_i - x_o|) L_d(x_i) dA over samples of a surface (Maisch & Ropinski 2017, eq. 5).
 //
-// Samples come in blocks; each workgroup has a list of those that lie within the profile's range of its receivers. Each
-// block is summed before it is added, since a sum of many small numbers would lose them to rounding.
+// Samples are grouped in blocks. Each workgroup has a list of the blocks within the range of the profile from its
+// receivers. Each block is summed on its own before it is added to the total, to limit rounding errors.
 
 import package::profile_table::{entry_of, fraction_of};
 import package::units::{Area, Irradiance, Number, Position, Direction};
 
-const LANES: u32 = 64u;  // receivers of a workgroup
-const BLOCK: u32 = 256u; // samples
+const LANES: u32 = 64u;  // receivers per workgroup
+const BLOCK: u32 = 256u; // samples per block
 
 struct Params {
-    first_entry: u32, // of the kernel, as the leading bits of the squared distance
-    first_group: u32, // of the workgroups with a list
+    first_entry: u32, // leading bits of the squared distance of the first row of the kernel
+    first_group: u32, // number of the first workgroup of receivers in this dispatch
 }
 
 struct Sample {
@@ -31,10 +31,10 @@ struct Sums {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> kernel: array<vec4f>; // 1/mm^2: for the receiver's sheet, then for opposite ones
+@group(0) @binding(1) var<storage, read> kernel: array<vec4f>; // 1/mm^2: for samples on the same side, then for others
 @group(0) @binding(2) var<storage, read> samples: array<Sample>;
 @group(0) @binding(3) var<storage, read> receivers: array<Receiver>;
-@group(0) @binding(4) var<storage, read> starts: array<u32>;   // of the groups' lists
+@group(0) @binding(4) var<storage, read> starts: array<u32>;   // where the list of each workgroup begins in `blocks`
 @group(0) @binding(5) var<storage, read> blocks: array<u32>;
 @group(0) @binding(6) var<storage, read_write> sums: array<Sums>;
 

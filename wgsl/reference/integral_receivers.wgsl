@@ -1,4 +1,4 @@
-// Where each pixel sees a surface: the face, and where on it.
+// The point of the surface at each pixel: its face and its barycentric coordinates.
 
 import package::mesh::{Vertex, ObjectUniforms, color_after, map_coordinates};
 import package::targets::{RGBA32Float};
@@ -10,10 +10,10 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> corners: array<u32>; // vertices of the faces
+@group(0) @binding(3) var<storage, read> corners: array<u32>; // indices of the vertices of the faces
 @group(0) @binding(4) var base_color_map: texture_2d<f32>;
 @group(0) @binding(5) var linear_repeat: sampler;
-@group(0) @binding(6) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
+@group(0) @binding(6) var<storage, read> colors: array<vec4f>; // base colour of each vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -24,8 +24,8 @@ struct Varying {
 }
 
 struct Receivers {
-    @location(0) place: RGBA32Float, // the first two barycentric coordinates; face; object id
-    @location(1) color: RGBA32Float, // the base colour's share after diffusion
+    @location(0) place: RGBA32Float, // two barycentric coordinates, face, object id
+    @location(1) color: RGBA32Float, // the part of the base colour applied after diffusion
 }
 
 @vertex

@@ -1,66 +1,66 @@
-// Photons through a stack of plane layers, from a beam that has entered its top at a right angle, or from a sky that
-// shines on a point of it evenly.
+// Photons through a stack of plane layers. They enter at one point of the top, at a right angle or from a uniform sky.
 //
-// The method of Wang, Jacques and Zheng 1995 (MCML): flights of random length, a share of the weight absorbed at each
-// scattering, Henyey and Greenstein's phase function, reflection or refraction by chance where indices differ, roulette.
+// The method of Wang, Jacques & Zheng 1995 (MCML): free paths of random length, absorption of a share of the weight at
+// each scattering, the phase function of Henyey and Greenstein, random choice between reflection and refraction at
+// boundaries of different indices, and Russian roulette.
 //
-// In a medium that absorbs next to nothing paths would have no end. Deep inside of it a photon leaps: far from boundaries
-// light diffuses, so that it leaves a sphere about the point that its path tends to, a transport mean free path ahead,
-// anywhere with equal likelihood, and with its weight times x / sinh(x), x = sigma_tr * radius.
+// In a medium that hardly absorbs, paths would be very long. Far from the boundaries light diffuses. There a photon
+// leaps to a random point of a sphere. The centre of the sphere lies one transport mean free path ahead, and the weight
+// is multiplied by x / sinh(x), x = sigma_tr * radius.
 //
-// A lane whose photon has ended takes the next one, so that lanes do not wait for the longest path. Lanes keep what they
-// do from one dispatch to the next, so that none takes long. A photon's random numbers follow from its own number and
-// tallies are integers, so that the result does not depend on which lane took which photon, or when.
+// A lane whose photon has ended takes the next one, so that no lane waits for the longest path. Lanes store their
+// photon between dispatches, so that each dispatch is short. The random numbers of a photon depend on its number only,
+// and tallies are integers, so that the result does not depend on the order of execution.
 
 import package::fresnel::{fresnel_dielectric};
 import package::units::{Length, Number, PI};
 import package::random::{random_words, random_numbers};
 
-const LANES: u32 = 64u;         // of a workgroup
-const AT_ONCE: u32 = 4096u;     // flights of a lane in one dispatch; lavapipe ends a shader's loops after 65,535 turns
+const LANES: u32 = 64u;         // lanes per workgroup
+const AT_ONCE: u32 = 4096u;     // steps of a lane in one dispatch; lavapipe ends loops after 65,535 iterations
 const RINGS: u32 = 384u;
-const TALLIES: u32 = 769u;      // of a batch: rings of what is reflected, of what is transmitted, what is absorbed
-const ONE: f32 = 2097152.0;     // 2^21, the tally of a photon of full weight: batches are of at most 1024
-const FAINT: Number = 1e-4;     // weight below which a photon lives on with a chance of SURVIVAL
+const TALLIES: u32 = 769u;      // per batch: rings of reflected photons, rings of transmitted photons, absorption
+const ONE: f32 = 2097152.0;     // 2^21, the tally of a photon of weight 1; a batch has at most 1024 photons
+const FAINT: Number = 1e-4;     // weight below which a photon survives with the probability SURVIVAL
 const SURVIVAL: Number = 0.125;
-const DEEP: Number = 24.0;      // transport mean free paths from the boundaries of a layer from which a photon leaps
-const MARGIN: Number = 8.0;     // that a leap keeps from them
+const DEEP: Number = 24.0;      // smallest distance from the boundaries for a leap, in transport mean free paths
+const MARGIN: Number = 8.0;     // smallest distance from the boundaries after a leap, in the same unit
 
-override LEAPS: u32 = 0u;       // 1 where there is a layer to leap in
-override SKY: u32 = 0u;         // 1 where light comes from everywhere above
+override LEAPS: u32 = 0u;       // 1 if photons may leap in one of the layers
+override SKY: u32 = 0u;         // 1 if photons enter from a uniform sky
 
 struct Layer {
     sigma_t: Number,    // 1/mm
-    absorbed: Number,   // share of the weight that a scattering takes
+    absorbed: Number,   // share of the weight that is absorbed at a scattering
     g: Number,
-    transport: Length,  // transport mean free path, 1 / sigma_t'; endless where leaps would be wrong
+    transport: Length,  // transport mean free path, 1 / sigma_t'; practically infinite if leaps would be wrong
     sigma_tr: Number,   // 1/mm
     thickness: Length,
-    above: Number,      // index over that of what lies above
-    below: Number,      // index over that of what lies below
+    above: Number,      // index of the layer over that of the medium above
+    below: Number,      // index of the layer over that of the medium below
 }
 
 struct Params {
-    key: vec2u,       // of the random numbers
+    key: vec2u,       // key of the random numbers
     first: u32,       // number of the first photon
     end: u32,         // number after the last photon
     batch: u32,       // photons in a batch
-    innermost: u32,   // the least radius told apart, as `ring` gives it
+    innermost: u32,   // the smallest resolved ring, as returned by `ring`
 }
 
-// A photon on its way.
+// A photon and its path so far.
 struct Photon {
     p: vec3f,         // mm; z is the depth below the top of the layer
-    weight: Number,   // 0 once it has ended
-    w: vec3f,         // direction; 0 before it has entered
-    stock: Number,    // weight and what was absorbed of it: 1, but for roulette
+    weight: Number,   // 0 if it has ended
+    w: vec3f,         // direction; 0 before it enters
+    stock: Number,    // weight plus absorbed weight: 1, except for roulette
     number: u32,
     flight: u32,
     layer: u32,
 }
 
 struct Work {
-    taken: atomic<u32>,    // photons begun
+    taken: atomic<u32>,    // number of photons started
     lanes: array<Photon>,
 }
 
@@ -68,14 +68,14 @@ struct Work {
 @group(0) @binding(1) var<storage, read> layers: array<Layer>;
 @group(0) @binding(2) var<storage, read_write> work: Work;
 @group(0) @binding(3) var<storage, read_write> tallies: array<atomic<u32>>;
-@group(0) @binding(4) var<storage, read_write> busy: array<u32>; // lanes that want another dispatch
+@group(0) @binding(4) var<storage, read_write> busy: array<u32>; // 1 for each lane that needs another dispatch
 
-// Rings by the leading bits of the squared radius: sixteen for each doubling of the radius, with edges that are exact.
+// Return the ring of a point: the leading bits of its squared radius. A factor of 2 in radius has 16 rings.
 fn ring(x: Length, y: Length) -> u32 {
     return bitcast<u32>(x * x + y * y) >> 20u;
 }
 
-// The direction of cosine `cosine` to `w`, a unit vector, turned about it by the angle `turn`.
+// Return the direction whose angle to the unit vector `w` has the cosine `cosine`, rotated about `w` by `turn`.
 fn scattered(w: vec3f, cosine: Number, turn: Number) -> vec3f {
     let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let x = sine * cos(turn);
@@ -84,10 +84,10 @@ fn scattered(w: vec3f, cosine: Number, turn: Number) -> vec3f {
     let a = -1.0 / (s + w.z); // the frame of Duff et al. 2017
     let b = w.x * w.y * a;
     let u = x * vec3f(1.0 + s * w.x * w.x * a, s * b, -s * w.x) + y * vec3f(b, s + w.y * w.y * a, -w.y) + cosine * w;
-    return u * (1.5 - 0.5 * dot(u, u)); // rounding must not add up over thousands of scatterings
+    return u * (1.5 - 0.5 * dot(u, u)); // normalises: rounding errors must not accumulate
 }
 
-// The direction in which a photon from an even sky enters: 0 where the top reflects it, and the next is to be tried.
+// Return the direction below the top of a photon from a uniform sky, or 0 if the top reflects the photon.
 fn entering(eta: Number, u: vec4f) -> vec3f {
     let outside = sqrt(u.x); // cosine
     if u.y < fresnel_dielectric(outside, eta) {
@@ -142,7 +142,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
         if !leap && wall < free {
             let eta = select(here.above, here.below, down);
-            // The squared cosine of the refracted ray, exact where indices are equal.
+            // The squared cosine of the refracted ray, exact if the indices are equal.
             let squared = (1.0 - eta * eta) + eta * eta * cosine * cosine;
             let refracted = sqrt(max(squared, 0.0));
             let s = (eta * cosine - refracted) / (eta * cosine + refracted);
@@ -168,7 +168,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 photon.stock += kept - photon.weight;
                 photon.weight = kept;
             }
-            // Henyey and Greenstein's cosine, written so that g may be 0.
+            // The cosine of Henyey and Greenstein, in a form that allows g = 0.
             let v = 2.0 * u.y - 1.0;
             let q = 1.0 + g * v;
             let forward = (0.5 * g * (3.0 - g * g) + (1.0 + g * g) * v * (1.0 + 0.5 * g * v)) / (q * q);

@@ -1,4 +1,4 @@
-// What a reference knows, as a pass of the frame.
+// Shows M that a reference has computed.
 
 import package::screen::{screen_corner};
 import package::targets::{RGBA32Float};

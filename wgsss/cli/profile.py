@@ -58,7 +58,7 @@ def run(args: Any) -> None:
         models.append("photons")
     by_model = profiles.profiles(case, models)
     r = profiles.distances_for(by_model) if args.r is None else np.array(args.r)
-    rows = [profiles.described(name, profile, r, args.k) for name, profile in by_model.items()]
+    rows = [profiles.profile_json(name, profile, r, args.k) for name, profile in by_model.items()]
     if output:
         from wgsss.study.profile_plot import plot
 

@@ -1,4 +1,4 @@
-"""M by brute force: the integral over the surface, summed over ever denser samples until it stops moving."""
+"""M by brute force: the integral over the surface, summed over denser and denser samples until it converges."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ TOLERANCE, SAMPLES = 0.01, 1_000_000
 
 @dataclass(frozen=True)
 class Integral(Reference):
-    """M_front and M_back as sums over samples of the surface; `error` is what halving their spacing changed last."""
+    """M_front and M_back as sums over samples of the surface. The last halving of the spacing gives `error`."""
 
     tolerance: float = field(
         default=TOLERANCE,
-        metadata={"unit": "", "range": (1e-6, 1.0), "help": "relative change of M, RMS, by half the spacing"},
+        metadata={"unit": "", "range": (1e-6, 1.0), "help": "relative change of M, RMS, when the spacing is halved"},
     )
     samples: int = field(
-        default=SAMPLES, metadata={"unit": "", "range": (1000, 100_000_000), "help": "samples per object, at most"}
+        default=SAMPLES,
+        metadata={"unit": "", "range": (1000, 100_000_000), "help": "largest number of samples per object"},
     )
 
     source: ClassVar[str] = "Maisch & Ropinski 2017, eq. 5 and 13, 14, by brute force"
@@ -52,24 +53,24 @@ def integral(
     tolerance: float = TOLERANCE,
     samples: int = SAMPLES,
 ) -> Estimate:
-    """M of a scene as posed at `size` (width, height) pixels, cached.
+    """Return M of a scene as posed, at `size` (width, height) pixels. Cached.
 
     Args:
-        profiles: by the index of a body, in place of its material's.
-        tolerance: once halving the spacing of samples changes M by less, RMS over an object's pixels relative to the
-            RMS of M there, in the channel where it changes most, its samples are dense enough.
-        samples: of an object, at most; but at least four for each face. Warns where M still moves.
+        profiles: by the index of a body, instead of the profile of its material.
+        tolerance: the samples of an object are dense enough if halving their spacing changes M by at most this. The
+            change is the RMS over the object's pixels, relative to the RMS of M there, in the worst channel.
+        samples: largest number of samples of an object, but each face has at least four. Warns if M has not converged.
     """
     width, height = size
     used = {body.index: (profiles or {}).get(body.index, body.material.profile) for body in stage.bodies}
 
-    def make() -> Arrays:
+    def compute() -> Arrays:
         front, back, error = np.zeros((3, height, width, 3), np.float32)
         notes = []
         graph = Graph(stage.gpu)
-        seen = _seen(begin(graph, stage, size))
-        graph.run(seen.place, seen.color)
-        place, color = graph.read(seen.place), graph.read(seen.color)[..., :3]
+        pixels = pixel_receivers(begin(graph, stage, size))
+        graph.run(pixels.place, pixels.color)
+        place, color = graph.read(pixels.place), graph.read(pixels.color)[..., :3]
         for body in stage.bodies:
             here = place[..., 3] == body.index + 1
             if not here.any():
@@ -77,14 +78,14 @@ def integral(
             b = place[here][:, :2].astype(np.float64)
             barycentric = np.column_stack([b, 1.0 - b.sum(axis=1)])
             receivers = Samples(place[here][:, 2].astype(np.int32), barycentric, np.zeros(len(b)))
-            found = converged(body, receivers, used[body.index], tolerance, samples)
+            M = converged(body, receivers, used[body.index], tolerance, samples)
             after = color[here]
-            front[here], back[here], error[here] = found.front * after, found.back * after, found.error * after
-            notes.append(found.note)
+            front[here], back[here], error[here] = M.front * after, M.back * after, M.error * after
+            notes.append(M.note)
         return {"front": front, "back": back, "error": error, "notes": np.array(notes, "U")}
 
-    found = _cached(stage, used, [*size, tolerance, samples], make)
-    return Estimate(found["front"], found["back"], found["error"])
+    arrays = _cached(stage, used, [*size, tolerance, samples], compute)
+    return Estimate(arrays["front"], arrays["back"], arrays["error"])
 
 
 def at_vertices(
@@ -95,29 +96,30 @@ def at_vertices(
     tolerance: float = TOLERANCE,
     samples: int = SAMPLES,
 ) -> tuple[Array, Array]:
-    """M_front and M_back, float32 (V, 3) in W/m^2, at the vertices of a body's mesh, cached.
+    """Return M_front and M_back, float32 (V, 3) in W/m^2, at the vertices of a body's mesh. Cached.
 
-    As the paper has M: without what `color_after` leaves of the base colour. Where normals or texture coordinates split
-    a vertex, it counts as part of one of its sides. Arguments and warnings as of `integral`.
+    As in Maisch & Ropinski 2017, M excludes the part of the base colour that `color_after` applies after diffusion. If
+    normals or texture coordinates split a vertex, it is taken as part of one of its sides. Arguments and warnings are
+    those of `integral`.
     """
     profile = profile or body.material.profile
 
-    def make() -> Arrays:
+    def compute() -> Arrays:
         used, first = np.unique(body.mesh.faces, return_index=True)
         receivers = Samples((first // 3).astype(np.int32), np.eye(3)[first % 3], np.zeros(len(first)))
-        found = converged(body, receivers, profile, tolerance, samples)
+        M = converged(body, receivers, profile, tolerance, samples)
         front, back = np.zeros((2, len(body.mesh.positions), 3), np.float32)
-        front[used], back[used] = found.front, found.back
-        return {"front": front, "back": back, "notes": np.array([found.note], "U")}
+        front[used], back[used] = M.front, M.back
+        return {"front": front, "back": back, "notes": np.array([M.note], "U")}
 
-    found = _cached(stage, {body.index: profile}, ["vertices", body.index, tolerance, samples], make)
-    return found["front"], found["back"]
+    arrays = _cached(stage, {body.index: profile}, ["vertices", body.index, tolerance, samples], compute)
+    return arrays["front"], arrays["back"]
 
 
 def _cached(
-    stage: Stage, profiles: Mapping[int, Profile], settings: Sequence[object], make: Callable[[], Arrays]
+    stage: Stage, profiles: Mapping[int, Profile], settings: Sequence[object], compute: Callable[[], Arrays]
 ) -> Arrays:
-    """What `make` gives for the scene as posed; its notes are warnings, now and whenever it comes from the cache."""
+    """Return the arrays of `compute` for the scene as posed. Its notes are warnings, also when they are cached."""
     scene = stage.scene
     # M depends neither on how the picture is shown nor on `transport`. The notes contain the names.
     skies = [light.pixels() for light in stage.environments()]
@@ -125,23 +127,27 @@ def _cached(
     still = [replace(body.rest, motion=None, material=replace(body.material, transport=None)) for body in stage.bodies]
     posed = [body.mesh for body in stage.bodies]
     key = [stage.gpu.name, scene.camera, scene.lights, skies, names, still, posed, profiles, settings]
-    found = cached("integral", key, make)
-    for note in filter(None, found["notes"].tolist()):
+    arrays = cached("integral", key, compute)
+    for note in filter(None, arrays["notes"].tolist()):
         warnings.warn(note, Note, stacklevel=3)
-    return found
+    return arrays
 
 
-def _seen(frame: Frame) -> Any:
-    """Which face is seen at each pixel, and where on it."""
+def pixel_receivers(frame: Frame) -> Any:
+    """Declare the passes that find the point of the surface at each pixel.
+
+    Returns the handles `place` (two barycentric coordinates, face, object id) and `color` (the part of the base colour
+    applied after diffusion).
+    """
     drawn: Any = None
     for body in frame.stage.bodies:
-        kept = {} if drawn is None else {n: getattr(drawn, n) for n in ("place", "color")}
+        targets = {} if drawn is None else {n: getattr(drawn, n) for n in ("place", "color")}
         drawn = frame.graph.draw(
             "reference/integral_receivers",
             size=frame.size,
             count=3 * len(body.mesh.faces),
             depth_buffer="new" if drawn is None else drawn.depth,
-            into=kept,
+            into=targets,
             params={"world_to_clip": frame.view.world_to_clip},
             object=body.object_uniforms,
             vertices=body.vertices,

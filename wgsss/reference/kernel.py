@@ -1,4 +1,4 @@
-"""A diffusion profile as a table for sums over samples of a surface, without the spike that samples would miss."""
+"""A diffusion profile as a table for sums over samples of a surface, with its peak at r = 0 handled apart."""
 
 from __future__ import annotations
 
@@ -13,36 +13,37 @@ from wgsss.optics.lookup import interval_starts, leading_bits
 
 Array = npt.NDArray[Any]
 
-NEGLIGIBLE = 1e-5  # share of the light that leaves beyond the table, and is left out
-# Both in spacings of the samples. With less, what is sampled has features that samples miss; with more, a surface that
-# bends or ends nearby, and light that changes there, count as flat and level. See the tests of convergence.
+NEGLIGIBLE = 1e-5  # share of the light that leaves beyond the end of the table, and is neglected
+# In spacings of the samples. With smaller values, the sampled function has features that samples miss. With larger
+# values, a curved surface, a border or a change of the light nearby is treated as a uniformly lit plane. The tests of
+# convergence check them.
 RADIUS, BLUR = 0.8, 0.5
-_CLOSEST = 1 / 32  # of the spacing: closer, the table is level
+_CLOSEST = 1 / 32  # of the spacing: at smaller distances the table is constant
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """R_d = R_d chi + R_d (1 - chi), with chi falling from 1 at distance 0 to 0 at RADIUS spacings of the samples.
+    """R_d = R_d chi + R_d (1 - chi), where chi falls from 1 at distance 0 to 0 at RADIUS spacings of the samples.
 
-    The second part, blurred a little so that samples tell all of it, is summed over the sheet that a receiver lies on.
-    The first part, which samples may miss or take for too much, is taken as light that is the same all over that radius
-    on a plane: its integral is known. What lies on opposite sheets is sampled as it is.
+    Samples could miss or overestimate the first part. It is integrated analytically, as if the surface within the
+    radius were a uniformly lit plane. The second part is blurred slightly, so that samples resolve it, and summed over
+    the samples whose normals are within 90 degrees of the receiver's. The other samples are summed with R_d itself.
     """
 
     table: Array
-    """float32 (2 n, 4): the second part and R_d, each n rows by the leading bits of the squared distance, 1/mm^2; 0 in
-    the last of the n"""
+    """float32 (2 n, 4), 1/mm^2: n rows of the second part, then n rows of R_d, by the leading bits of the squared
+    distance. The last row of each is 0."""
     first: int
-    """the bits of the first row"""
+    """The leading bits that belong to the first row."""
     near: Array
-    """float64 (3,): the integral of the first part over the plane"""
+    """float64 (3,): the integral of the first part over the plane."""
     reach: float
-    """mm: beyond, R_d counts as 0"""
+    """mm: beyond this distance, R_d counts as 0."""
 
 
 def make_kernel(profile: Profile, spacing: float, farthest: float) -> Kernel:
-    """The kernel of a profile for samples `spacing` mm apart on a body of `farthest` mm across."""
+    """Return the kernel of a profile for samples `spacing` mm apart, on a body that is `farthest` mm across."""
     reach = max(min(float(profile.range(NEGLIGIBLE).max()), farthest), spacing)
     first, last = leading_bits(np.square([_CLOSEST * spacing, reach])).tolist()
     r = np.sqrt(interval_starts(first, last + 2))
@@ -53,12 +54,16 @@ def make_kernel(profile: Profile, spacing: float, farthest: float) -> Kernel:
 
 
 def _chi(r: Array, spacing: float) -> Array:
-    """By rows (n, 1) of distances: level at 0, with two derivatives at the radius."""
+    """Return chi (n, 1) at distances (n,): flat at 0, and twice differentiable at the radius."""
     return np.maximum(1.0 - np.square(r / (RADIUS * spacing)), 0.0)[..., None] ** 3
 
 
 def _near(profile: Profile, spacing: float) -> Array:
-    """The integral of R_d chi: by parts, what is enclosed weighted by how chi falls, smooth where R_d is not."""
+    """Return the integral of R_d chi over the plane.
+
+    Integration by parts turns it into an integral of the enclosed light times the slope of chi, which is smooth even if
+    R_d is not.
+    """
     x = 0.5 * (1.0 + _NODES)
     fall = 6.0 * x * (1.0 - x * x) ** 2
     inside = profile.enclosed(RADIUS * spacing * x)
@@ -67,10 +72,10 @@ def _near(profile: Profile, spacing: float) -> Array:
 
 
 def _blurred(profile: Profile, r: Array, spacing: float) -> Array:
-    """R_d (1 - chi) at distances r (n,), blurred over the plane by a Gaussian: (n, 3).
+    """Return R_d (1 - chi) at distances r (n,), blurred over the plane by a Gaussian: (n, 3).
 
-    Some spacings away, where R_d is too level for a blur to matter, it is left as it is; the light that the blur has
-    carried there is given back nearer by, so that the integral over the plane is kept.
+    The blur fades out within five spacings, beyond which R_d changes too slowly for it to matter. The blurred part is
+    scaled so that the integral over the plane does not change.
     """
     from scipy.special import ive
 
@@ -89,6 +94,6 @@ def _blurred(profile: Profile, r: Array, spacing: float) -> Array:
     def soft(r: Array) -> Array:
         return np.stack([np.interp(r, at, blurred[:, c]) for c in range(3)], axis=-1)
 
-    kept, left = (((f(x) * fade(x)) * x[:, None]).sum(axis=0) for f in (sharp, soft))
-    scale = np.divide(kept, left, out=np.ones(3), where=left > 0.0)
+    sharp_total, soft_total = (((f(x) * fade(x)) * x[:, None]).sum(axis=0) for f in (sharp, soft))
+    scale = np.divide(sharp_total, soft_total, out=np.ones(3), where=soft_total > 0.0)
     return sharp(r) + fade(r) * (scale * soft(r) - sharp(r))

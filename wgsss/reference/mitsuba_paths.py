@@ -1,4 +1,4 @@
-"""Paths through a scene, by a Mitsuba that runs beside us: found, started when first needed, ended with us."""
+"""Path tracing of a scene by Mitsuba in a separate process, which starts when it is first needed."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ import numpy.typing as npt
 from wgsss.cache import cached
 from wgsss.errors import InputError, Note, RenderError
 from wgsss.reference import mitsuba_render, mitsuba_scene
-from wgsss.reference.mitsuba_xml import described
+from wgsss.reference.mitsuba_xml import scene_xml
 from wgsss.scene import Scene
 
 Array = npt.NDArray[Any]
 
-_BATCH = 1 << 20  # paths, about: what is lost when a run is stopped
-_PER_PIXEL = (4, 256)  # paths of a batch, least and most
-_LEAST_LLVM = 16  # 15 does not compile what Mitsuba 3.9 asks of it
-_LLVM_PLACES = (
+_BATCH = 1 << 20  # approximate number of paths of a batch: an interrupt loses at most these
+_PER_PIXEL = (4, 256)  # smallest and largest number of paths per pixel of a batch
+_LEAST_LLVM = 16  # version 15 does not compile the code of Mitsuba 3.9
+_LLVM_PATTERNS = (
     "/usr/lib/*/libLLVM*.so*",
     "/usr/lib*/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
@@ -39,9 +39,9 @@ _LLVM_PLACES = (
 
 
 class Paths:
-    """Paths along `rays` (N, 6), origins in mm and directions, of a scene as it stands. To be used in a `with`.
+    """Paths along `rays` (N, 6), origins in mm and directions, through a scene as posed. A context manager.
 
-    Raises InputError where Mitsuba is not installed.
+    Raises InputError if Mitsuba is not installed.
     """
 
     def __init__(self, scene: Scene, size: tuple[int, int], rays: Array) -> None:
@@ -66,7 +66,7 @@ class Paths:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _content_of_files(self) -> str:
-        """Write meshes and environments; a digest of them."""
+        """Write the meshes and the environments, and return a digest of the files."""
         files = mitsuba_scene.write_meshes(self._scene, self._folder)
         for channel in range(3):
             files += mitsuba_scene.write_environment(self._scene, self._folder, channel)
@@ -76,29 +76,29 @@ class Paths:
         return digest.hexdigest()
 
     def batches(self, samples: int) -> list[int]:
-        """Paths per ray of each batch: as many as `samples` in all. The first ones are the same for any number."""
+        """Split `samples` paths per ray into batches. The first batches do not depend on the number of samples."""
         fewest, most = _PER_PIXEL
         size = max(fewest, min(most, _BATCH // max(len(self._rays), 1)))
         return [min(size, samples - first) for first in range(0, samples, size)]
 
-    def follow(self, channel: int, scatters: bool, samples: int, bar: Any) -> tuple[Array, Array]:
-        """Mean radiance (N,) in W/(m^2 sr) of `samples` paths per ray, and the square of its standard error."""
+    def trace(self, channel: int, scatters: bool, samples: int, bar: Any) -> tuple[Array, Array]:
+        """Return the mean radiance (N,) of `samples` paths per ray, W/(m^2 sr), and its standard error squared."""
         first, second = np.zeros(len(self._rays)), np.zeros(len(self._rays))
-        xml = described(self._scene, self._size, channel, scatters)
+        xml = scene_xml(self._scene, self._size, channel, scatters)
         for number, paths in enumerate(self.batches(samples)):
-            # No two batches share random numbers; each ray of a batch takes its own from there.
+            # Each batch has its own seed, from which every ray of the batch derives its random numbers.
             seed = ((2 * channel + scatters) << 24) + (number << 6)
             order = {"paths": paths, "seed": seed}
             key = [*self._content, xml, *order.values()]
-            found = cached("volume", key, lambda xml=xml, order=order: self._ask(xml, order))  # type: ignore[misc]
-            first += paths * found["mean"]
-            second += paths * found["square"]
+            moments = cached("volume", key, lambda xml=xml, order=order: self._request(xml, order))  # type: ignore[misc]
+            first += paths * moments["mean"]
+            second += paths * moments["square"]
             bar.update(paths)
         mean = first / samples
         return mean, np.maximum(second / samples - mean**2, 0.0) / (samples - 1)
 
-    def _ask(self, xml: str, order: dict[str, int]) -> dict[str, Array]:
-        """A batch from the process."""
+    def _request(self, xml: str, order: dict[str, int]) -> dict[str, Array]:
+        """Let the process trace a batch, and return its result."""
         name = hashlib.sha256(xml.encode()).hexdigest()[:16]
         scene, rays, result = (self._folder / n for n in (f"{name}.xml", "rays.npy", "result.npz"))
         if not scene.exists():
@@ -113,9 +113,9 @@ class Paths:
             answer = process.stdout.readline()
         except BrokenPipeError:
             answer = ""
-        told = json.loads(answer) if answer else {"error": f"it ended: {self._last_words()}"}
-        if "error" in told:
-            raise RenderError(f"Mitsuba: {told['error']}")
+        reply = json.loads(answer) if answer else {"error": f"the process ended: {self._last_error()}"}
+        if "error" in reply:
+            raise RenderError(f"Mitsuba: {reply['error']}")
         with np.load(result) as arrays:
             return dict(arrays)
 
@@ -123,13 +123,13 @@ class Paths:
         np.save(rays, self._rays)
         if self._llvm is None:
             warnings.warn(
-                f"no LLVM of at least version {_LEAST_LLVM} found (libllvm19 in Debian): Mitsuba follows one path after"
-                " another, on one core",
+                f"no LLVM of at least version {_LEAST_LLVM} was found (libllvm19 in Debian): Mitsuba traces one path"
+                " after another on one core",
                 Note,
                 stacklevel=2,
             )
         environment = {**os.environ, **({"DRJIT_LIBLLVM_PATH": self._llvm} if self._llvm else {})}
-        # -P: the folder of the program holds modules of ours, which are not those of its imports.
+        # -P: otherwise the program could import modules of its own folder.
         command = [sys.executable, "-P", str(mitsuba_render.__file__), self._variant]
         with (self._folder / "errors").open("w") as errors:
             self._process = subprocess.Popen(
@@ -139,23 +139,23 @@ class Paths:
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 text=True,
-                start_new_session=True,  # so that signals from the terminal reach only us
+                start_new_session=True,  # so that signals from the terminal do not reach it
             )
         return self._process
 
-    def _last_words(self) -> str:
+    def _last_error(self) -> str:
         lines = (self._folder / "errors").read_text(errors="replace").split("\n")
-        return next((line.strip()[:200] for line in reversed(lines) if line.strip()), "without a word")
+        return next((line.strip()[:200] for line in reversed(lines) if line.strip()), "no message")
 
 
 def newest_llvm() -> str | None:
-    """The LLVM library by which Mitsuba compiles: $DRJIT_LIBLLVM_PATH, else the newest that is known to do."""
+    """Return the LLVM library that Mitsuba compiles with: $DRJIT_LIBLLVM_PATH, or the newest one found."""
     if chosen := os.environ.get("DRJIT_LIBLLVM_PATH"):
         return chosen
-    found = []
-    for place in _LLVM_PLACES:
-        for path in glob.glob(place):
+    versions = []
+    for pattern in _LLVM_PATTERNS:
+        for path in glob.glob(pattern):
             match = re.search(r"libLLVM(?:-|\.so\.|\.)?(\d+)", Path(path).name)
             if match and int(match[1]) >= _LEAST_LLVM:
-                found.append((int(match[1]), path))
-    return max(found)[1] if found else None
+                versions.append((int(match[1]), path))
+    return max(versions)[1] if versions else None

@@ -1,4 +1,4 @@
-"""A scene for Mitsuba 3: what it can have of ours, and the files that hold it."""
+"""The export of a scene to Mitsuba 3: what Mitsuba can represent, and the files."""
 
 from __future__ import annotations
 
@@ -11,80 +11,81 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
 from wgsss.folders import atomic_folder, created_folder
-from wgsss.reference.mitsuba_xml import SMOOTH, described, environment_file, environments
+from wgsss.reference.mitsuba_xml import SMOOTH, environment_file, environments, scene_xml
 from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight, checks
 
 Array = npt.NDArray[Any]
 
 
 def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path]:
-    """Write `scene`, as it stands, to `folder`, which is made: `mitsuba FOLDER/scene.xml` renders it as is. All files
-    appear at once or none does.
+    """Write `scene` as posed to `folder`, so that `mitsuba FOLDER/scene.xml` renders it. All files appear at once.
 
-    What the two renderers do not share is told in one warning. The integrator is `volpathmis`, whose paths serve the
-    three channels of a medium at once.
+    One warning names everything that Mitsuba renders differently. The integrator is `volpathmis`, whose paths serve the
+    three channels of a medium at the same time.
 
     Args:
         size: (width, height) in pixels.
 
     Raises:
-        InputError: for what Mitsuba cannot have (`check`), and a folder that cannot be written.
+        InputError: if Mitsuba cannot represent the scene (`check`), or if the folder cannot be written.
     """
     notes = check(scene)
     if any(thing.material.base_color != (1.0, 1.0, 1.0) for thing in scene.objects):
-        notes.append("base colours are left out")
+        notes.append("base colours are ignored")
     if len(scene.lights) > 1 and any(isinstance(light, RectLight | SphereLight) for light in scene.lights):
-        notes.append("lamps hide what is behind them")
+        notes.append("area and sphere lights hide objects and lights behind them")
     checks.image_size(size)
     folder = Path(folder)
     with created_folder(folder.parent), atomic_folder(folder) as place:
         files = [place / "scene.xml", *write_meshes(scene, place), *write_environment(scene, place)]
-        files[0].write_text(described(scene, size), encoding="utf-8")
+        files[0].write_text(scene_xml(scene, size), encoding="utf-8")
     written = [folder / file.name for file in files]
     if notes:
-        warnings.warn(f"{scene.name}: Mitsuba will differ: {'; '.join(notes)}", Note, stacklevel=2)
+        warnings.warn(f"{scene.name}: Mitsuba renders this scene differently: {'; '.join(notes)}", Note, stacklevel=2)
     return written
 
 
 def check(scene: Scene) -> list[str]:
-    """What Mitsuba will show otherwise than we do, in words.
+    """Return texts that say what Mitsuba renders differently.
 
-    Raises InputError for what it cannot have at all: a material without coefficients, a mesh with holes, a smooth
-    boundary under a light without size, two environment images.
+    Raises InputError if Mitsuba cannot represent the scene: a material without coefficients, a mesh with holes, a
+    smooth boundary under a directional or point light, two environment images.
     """
     notes: dict[str, None] = {}
     sizeless = [light for light in scene.lights if isinstance(light, DirectionalLight | PointLight)]
     for number, thing in enumerate(scene.objects, start=1):
         material, where = thing.material, f"{scene.name}: object {number} ({thing.mesh.name})"
         if material.sigma_a is None:
-            given = next(n for n in ("layers", "gaussians", "table") if getattr(material, n) is not None)
-            raise InputError(f"{where}: a volume needs sigma_a and sigma_s_prime, not {given} ('{material.name}')")
+            defined_by = next(n for n in ("layers", "gaussians", "table") if getattr(material, n) is not None)
+            raise InputError(f"{where}: a volume needs sigma_a and sigma_s_prime, not {defined_by} ('{material.name}')")
         if material.eta > 1 and material.roughness <= SMOOTH and sizeless:
             raise InputError(
-                f"{where}: through the smooth boundary of '{material.name}' no path finds a directional or point"
-                f" light; use a finite light or a roughness above {SMOOTH:g}"
+                f"{where}: no path through the smooth boundary of '{material.name}' can hit a directional or"
+                f" point light; use a light with a size, or a roughness above {SMOOTH:g}"
             )
         if not _closed(thing.mesh):
-            raise InputError(f"{where}: the mesh has holes, and so no inside to fill with a medium")
+            raise InputError(f"{where}: the mesh has holes, so that it encloses no volume for a medium")
         if material.maps.base_color is not None:
-            notes["base colour textures are left out"] = None
+            notes["base colour textures are ignored"] = None
         if material.maps.normal is not None:
-            notes["normal maps are left out"] = None
+            notes["normal maps are ignored"] = None
         if material.eta > 1 and material.roughness > SMOOTH:
-            notes["a rough boundary loses what its facets reflect twice"] = None
+            notes["a rough boundary loses light that is reflected by several facets"] = None
             if sizeless:
-                notes["through it, paths find directional and point lights by chance: it takes thousands"] = None
+                notes["paths through a rough boundary rarely hit directional and point lights: it takes thousands"] = (
+                    None
+                )
         if material.eta > 1 and (material.specular < 1 or material.maps.specular is not None):
-            notes["boundaries reflect in full, whatever specular says"] = None
+            notes["boundaries ignore the specular factor"] = None
     if len([light for light in scene.lights if isinstance(light, EnvironmentLight) and light.file]) > 1:
-        raise InputError(f"{scene.name}: Mitsuba has one environment image, not several")
+        raise InputError(f"{scene.name}: Mitsuba supports one environment image, not several")
     if len(scene.objects) > 1 or not _convex(scene.objects[0].mesh):
-        notes["light also goes from part to part through the air"] = None
+        notes["light also travels from part to part through the air"] = None
     return list(notes)
 
 
 def write_environment(scene: Scene, folder: Path, channel: int | None = None) -> list[Path]:
-    """The environment's image, if there is one, of all channels or of one."""
+    """Write the image of the environment, if there is one, with all channels or with one. Returns the files."""
     constant, image = environments(scene)
     if image is None:
         return []
@@ -100,7 +101,7 @@ def write_environment(scene: Scene, folder: Path, channel: int | None = None) ->
 
 
 def write_meshes(scene: Scene, folder: Path) -> list[Path]:
-    """Each object's mesh, placed in the world, as `<number>.ply`: binary, with the normals that it is shaded by."""
+    """Write the mesh of each object in world space, with shading normals, as binary `<number>.ply`."""
     written = []
     for number, thing in enumerate(scene.objects, start=1):
         mesh, turn = thing.mesh, thing.matrix[:3, :3]
@@ -127,7 +128,7 @@ def _ply(positions: Array, normals: Array, faces: Array) -> bytes:
 
 
 def _closed(mesh: Mesh) -> bool:
-    """Whether every edge is gone along as often one way as the other."""
+    """Whether the faces use every edge equally often in both directions."""
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     there = np.sort(edges[:, 0] * len(mesh.positions) + edges[:, 1])
     back = np.sort(edges[:, 1] * len(mesh.positions) + edges[:, 0])
@@ -135,7 +136,7 @@ def _closed(mesh: Mesh) -> bool:
 
 
 def _convex(mesh: Mesh) -> bool:
-    """Whether a mesh fills its convex hull, as nearly as flat triangles do."""
+    """Whether a mesh fills its convex hull, up to the error of flat triangles."""
     from scipy.spatial import ConvexHull, QhullError
 
     corners = mesh.positions.astype(np.float64)[mesh.faces]

@@ -1,16 +1,18 @@
-"""The XML by which Mitsuba 3 reads a scene.
+"""The XML file of a scene for Mitsuba 3.
 
-Lengths stay millimetres, so coefficients are 1/mm and the intensity of a point light, whose metres they are not, is
-multiplied by 10^6. All else is radiometry that a unit of length does not touch.
+Lengths stay in millimetres, so that coefficients are in 1/mm. The intensity of a point light is multiplied by 10^6,
+because irradiance is in W/m^2 and distances are in mm. The other radiometric quantities do not depend on the unit of
+length.
 
-A medium scatters with its reduced coefficients and alike in all directions. Its boundary is
+A medium scatters isotropically with its reduced coefficients. Its boundary is
 
-- none where eta is 1: light enters and leaves as if nothing were there;
-- a GGX dielectric of alpha = roughness^2, the surface that our specular lobe and rho_dt are the reflection of;
-- a smooth dielectric at the least roughness there is, where that lobe is narrower than a pixel.
+- none if eta is 1: light enters and leaves without reflection;
+- otherwise a GGX dielectric of alpha = roughness^2, the surface that our specular lobe and rho_dt assume;
+- a smooth dielectric at the smallest roughness, for which the specular lobe is narrower than a pixel.
 
-Lights of a finite size are not seen. As here, they let other light through where `volpath` renders one channel;
-`volpathmis`, which renders all three, would count twice what a path meets behind them, so that there they are black.
+The camera does not see lights of finite size. When `volpath` renders one channel, such lights let other light through,
+as in our renderer. `volpathmis`, which renders all three channels, would count the light behind them twice, so that
+there they are black.
 """
 
 from __future__ import annotations
@@ -31,20 +33,21 @@ from wgsss.scene import (
     Scene,
     SphereLight,
 )
+from wgsss.scene.light import Light
 
 Element = ElementTree.Element
 
-SMOOTH = 0.02  # the roughness at which, and below which, a boundary is smooth
+SMOOTH = 0.02  # largest roughness of a boundary that counts as smooth
 CHANNELS = ("red", "green", "blue")
 _MM2_PER_M2 = 1e6
-_STEPS = (16, 4096)  # scattering events, least and most, before paths may be ended by chance
+_STEPS = (16, 4096)  # smallest and largest number of scattering events before Russian roulette
 
 
-def described(scene: Scene, size: tuple[int, int], channel: int | None = None, scatters: bool = True) -> str:
-    """The XML of a scene whose meshes and environment lie beside it.
+def scene_xml(scene: Scene, size: tuple[int, int], channel: int | None = None, scatters: bool = True) -> str:
+    """Return the XML of a scene. Its meshes and its environment are files beside it.
 
-    Of one `channel`, all three channels of the rendering are that one. Where nothing `scatters`, the media absorb all
-    that they would scatter.
+    With a `channel`, all three channels of the rendering are this one. If `scatters` is false, the media absorb all the
+    light that they would scatter.
     """
     root = ElementTree.Element("scene", version="3.0.0")
     several = "volpathmis" if channel is None else "volpath"
@@ -64,7 +67,7 @@ def described(scene: Scene, size: tuple[int, int], channel: int | None = None, s
 
 
 def _plugin(parent: Element | None, tag: str, kind: str, name: str | None = None, **values: Any) -> Element:
-    """An element with its plain values."""
+    """Append an element with values of plain types to its parent, if it has one, and return the element."""
     element = ElementTree.Element(tag, {"type": kind, **({"name": name} if name else {})})
     for key, value in values.items():
         names = {bool: "boolean", int: "integer", float: "float", str: "string"}
@@ -89,7 +92,10 @@ def _rgb(parent: Element, name: str, values: Any, channel: int | None) -> None:
 
 
 def _steps(scene: Scene) -> int:
-    """Scattering events after which a path carries a hundredth of its light: to end it by chance before adds noise."""
+    """Return the number of scattering events before Russian roulette: those that leave 1 % of the light of a path.
+
+    Earlier roulette would add noise.
+    """
     albedo = max(float(np.max(thing.material.stack[0].albedo)) for thing in scene.objects if thing.material.stack)
     fewest, most = _STEPS
     return max(fewest, min(most, math.ceil(math.log(0.01) / math.log(albedo)))) if albedo < 1 else most
@@ -103,21 +109,21 @@ def _camera(scene: Scene, size: tuple[int, int]) -> Element:
     eye, target = np.asarray(camera.eye), np.asarray(camera.target)
     extent = max(float(np.ptp(depths)), 1e-3)
     parallel = isinstance(camera, OrthographicCamera)
-    back = max(0.0, extent - float(depths.min())) if parallel else 0.0  # parallel rays may begin behind the scene
+    back = max(0.0, extent - float(depths.min())) if parallel else 0.0  # parallel rays may start inside the scene
     eye = eye - back * (target - eye) / np.linalg.norm(target - eye)
     far = float(depths.max()) + back + extent
     near = 1e-4 * far
     kind = "orthographic" if parallel else "perspective"
     sensor = _plugin(None, "sensor", kind, near_clip=near, far_clip=far)
-    place = ElementTree.Element("transform", name="to_world")
-    if isinstance(camera, OrthographicCamera):  # its image spans -1 to 1 from side to side
+    to_world = ElementTree.Element("transform", name="to_world")
+    if isinstance(camera, OrthographicCamera):  # the width of its image spans -1 to 1
         half = _number(camera.height * size[0] / size[1] / 2)
-        ElementTree.SubElement(place, "scale", x=half, y=half)
+        ElementTree.SubElement(to_world, "scale", x=half, y=half)
     else:
         ElementTree.SubElement(sensor, "float", name="fov", value=_number(camera.fov))
         ElementTree.SubElement(sensor, "string", name="fov_axis", value="y")
-    sensor.append(place)
-    ElementTree.SubElement(place, "lookat", origin=_numbers(eye), target=_numbers(target), up=_numbers(camera.up))
+    sensor.append(to_world)
+    ElementTree.SubElement(to_world, "lookat", origin=_numbers(eye), target=_numbers(target), up=_numbers(camera.up))
     _plugin(sensor, "sampler", "independent")
     ElementTree.SubElement(sensor[-1], "integer", name="sample_count", value="$spp")
     film = _plugin(sensor, "film", "hdrfilm", width=size[0], height=size[1], pixel_format="rgba")
@@ -138,7 +144,7 @@ def _medium(material: Material, channel: int | None, scatters: bool) -> Element:
     assert material.stack is not None
     layer = material.stack[0]
     sigma_t = layer.sigma_t_prime if channel is None else layer.sigma_t_prime[[channel] * 3]
-    scale = float(sigma_t.max())  # Mitsuba takes colours of media from 0 to 1
+    scale = float(sigma_t.max())  # Mitsuba limits the colours of media to 0 to 1
     element = _plugin(None, "medium", "homogeneous", name="interior", scale=scale)
     _rgb(element, "sigma_t", sigma_t / scale, None)
     _rgb(element, "albedo", layer.albedo * scatters, channel)
@@ -146,7 +152,7 @@ def _medium(material: Material, channel: int | None, scatters: bool) -> Element:
     return element
 
 
-def _add_light(root: Element, light: Any, channel: int | None) -> None:
+def _add_light(root: Element, light: Light, channel: int | None) -> None:
     if isinstance(light, DirectionalLight):
         emitter = _plugin(root, "emitter", "directional")
         ElementTree.SubElement(emitter, "vector", name="direction", value=_numbers(light.direction))
@@ -157,17 +163,17 @@ def _add_light(root: Element, light: Any, channel: int | None) -> None:
         _rgb(emitter, "intensity", _MM2_PER_M2 * np.asarray(light.intensity), channel)
     else:
         shape = _plugin(root, "shape", "rectangle" if isinstance(light, RectLight) else "sphere")
-        place = ElementTree.SubElement(shape, "transform", name="to_world")
+        to_world = ElementTree.SubElement(shape, "transform", name="to_world")
         if isinstance(light, RectLight):
             half = {"x": _number(light.width / 2), "y": _number(light.height / 2)}
             ahead = np.add(light.position, np.asarray(light.direction) / np.linalg.norm(light.direction))
-            ElementTree.SubElement(place, "scale", half)
+            ElementTree.SubElement(to_world, "scale", half)
             look = {"origin": _numbers(light.position), "target": _numbers(ahead), "up": _numbers(light.up)}
-            ElementTree.SubElement(place, "lookat", look)
+            ElementTree.SubElement(to_world, "lookat", look)
         else:
             assert isinstance(light, SphereLight)
-            ElementTree.SubElement(place, "scale", value=_number(light.radius))
-            ElementTree.SubElement(place, "translate", value=_numbers(light.position))
+            ElementTree.SubElement(to_world, "scale", value=_number(light.radius))
+            ElementTree.SubElement(to_world, "translate", value=_numbers(light.position))
         if channel is None:
             _rgb(_plugin(shape, "bsdf", "diffuse"), "reflectance", (0.0, 0.0, 0.0), None)
         else:
@@ -176,24 +182,24 @@ def _add_light(root: Element, light: Any, channel: int | None) -> None:
 
 
 def _add_environment(root: Element, scene: Scene, channel: int | None) -> None:
-    """All environments in one, since Mitsuba has one at most."""
+    """Add the sum of all environments as one, because Mitsuba supports one."""
     constant, image = environments(scene)
     if image is not None:
         emitter = _plugin(root, "emitter", "envmap", filename=environment_file(channel))
-        place = ElementTree.SubElement(emitter, "transform", name="to_world")
-        # The middle of Mitsuba's image lies along +z, that of ours along -z.
-        ElementTree.SubElement(place, "rotate", y="1", angle=_number((180 + image.rotation) % 360))
+        to_world = ElementTree.SubElement(emitter, "transform", name="to_world")
+        # The centre of Mitsuba's image is in the direction +z, the centre of ours in -z.
+        ElementTree.SubElement(to_world, "rotate", y="1", angle=_number((180 + image.rotation) % 360))
     elif constant:
         total = np.sum([e.radiance for e in constant], axis=0)
         _rgb(_plugin(root, "emitter", "constant"), "radiance", total, channel)
 
 
 def environments(scene: Scene) -> tuple[list[EnvironmentLight], EnvironmentLight | None]:
-    """Those without an image, and the one with one."""
-    found = [light for light in scene.lights if isinstance(light, EnvironmentLight)]
-    return [e for e in found if e.file is None], next((e for e in found if e.file is not None), None)
+    """Return the environments without an image, and the one with an image."""
+    skies = [light for light in scene.lights if isinstance(light, EnvironmentLight)]
+    return [sky for sky in skies if sky.file is None], next((sky for sky in skies if sky.file is not None), None)
 
 
 def environment_file(channel: int | None) -> str:
-    """Name of the environment's image, of all channels or of one."""
+    """Return the file name of the environment's image, with all channels or with one."""
     return "environment.exr" if channel is None else f"environment.{CHANNELS[channel]}.exr"

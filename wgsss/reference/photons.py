@@ -1,4 +1,4 @@
-"""How light spreads in flat layers, by following photons: the truth that diffusion models are measured against."""
+"""Monte Carlo transport of photons in flat layers: the reference for diffusion models."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from wgsss.optics.medium import check_index, stack
 Array = NDArray[np.float64]
 
 _MODULE = "reference/photons"
-_NEAREST = 1 / 256  # the least radius told apart, of the shortest mean free path
-_ENDLESS = 1e20  # mm; still finite in float32 once divided by the flattest direction's cosine
-_CLEAR = 1e-4  # share of sigma_t' that may be absorption where photons leap
-_BATCH = 1024  # photons at most, so that tallies do not overflow
-_BATCHES = 64  # at least, where there are so many photons, for an error to be told from their spread
-_ROUND = 8192  # batches tallied before they are read: 24 MiB
+_NEAREST = 1 / 256  # smallest resolved radius, in shortest mean free paths
+_ENDLESS = 1e20  # mm; finite in float32 even after division by the smallest cosine
+_CLEAR = 1e-4  # largest share of absorption in sigma_t' for which photons leap
+_BATCH = 1024  # largest number of photons of a batch, so that tallies do not overflow
+_BATCHES = 64  # smallest number of batches, if there are that many photons: the error is estimated from their spread
+_ROUND = 8192  # batches per readback: 24 MiB
 
 
 def trace(
@@ -38,21 +38,22 @@ def trace(
     gpu: Gpu | None = None,
     label: str = "",
 ) -> Photons:
-    """Follow photons through a stack of layers, from the top down: the method of Wang, Jacques and Zheng 1995 (MCML).
+    """Trace photons through a stack of layers by the method of Wang, Jacques & Zheng 1995 (MCML).
 
-    Equal arguments give equal bits on one adapter. Where next to nothing absorbs, light deep inside of a layer moves by
-    diffusion in leaps, far from its boundaries: `wgsl/reference/photons.wgsl` says how.
+    Equal arguments give equal bits on one adapter. If a medium hardly absorbs, photons far from the boundaries of a
+    layer move in leaps by diffusion (see `wgsl/reference/photons.wgsl`).
 
     Args:
-        photons: to follow in each channel.
-        seed: at least 0; another one gives other random numbers.
-        eta_below: refractive index of what lies below the last layer. Above the first one is air.
-        sky: light comes evenly from everywhere above, not at a right angle. Obliquely, less of it reaches deep.
-        gpu: where to run; by default the device that the commands share.
-        label: of the progress bar, which shows on a terminal only.
+        layers: from the top down.
+        photons: number of photons per channel.
+        seed: of the random numbers, at least 0.
+        eta_below: refractive index of the medium below the last layer. Above the first layer is air.
+        sky: photons enter from all directions with equal radiance, and not at a right angle. Then fewer reach deep.
+        gpu: the device to run on, by default the one that the commands share.
+        label: label of the progress bar, which is shown on a terminal only.
 
     Raises:
-        InputError: for what is not a stack, less than one photon or 2^31 and more, a negative seed.
+        InputError: if the layers are not a stack, if photons is not from 1 to 2^31 - 1, or if the seed is negative.
     """
     layers = stack(layers)
     if not (isinstance(photons, int | np.integer) and 1 <= photons < 2**31):
@@ -65,7 +66,7 @@ def trace(
     with progress_bar(total=3 * photons, desc=label, unit=" photons", unit_scale=True) as bar:
         tracer = _Tracer(gpu or default_gpu(), int(photons), innermost, sky, bar)
         keys = [np.random.SeedSequence([seed, channel]).generate_state(2) for channel in range(3)]
-        counts = [tracer.follow(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]
+        counts = [tracer.trace(_packed(layers, eta_below, channel), key) for channel, key in enumerate(keys)]
     share = np.stack([count.share for count in counts], axis=-1)
     error = np.stack([count.error for count in counts], axis=-1)
 
@@ -93,7 +94,7 @@ def trace(
 
 
 def _packed(layers: Sequence[Layer], eta_below: float, channel: int) -> list[dict[str, float]]:
-    """The stack as one channel's photons meet it."""
+    """Return the layers as the shader reads them, for the photons of one channel."""
     indices = [1.0, *(layer.eta for layer in layers), eta_below]
     return [
         {
@@ -111,7 +112,7 @@ def _packed(layers: Sequence[Layer], eta_below: float, channel: int) -> list[dic
 
 
 class _Count:
-    """Sums over batches of what was tallied."""
+    """Sums of the tallies of batches."""
 
     def __init__(self) -> None:
         self.photons = self.batches = self.squared_sizes = 0
@@ -120,7 +121,7 @@ class _Count:
         self.products: Any = 0.0
 
     def add(self, tallies: Array, sizes: NDArray[np.int64]) -> None:
-        """Tallies (batches, n), and how many photons each batch had."""
+        """Add tallies (batches, n) of batches with `sizes` (batches,) photons."""
         self.photons += int(sizes.sum())
         self.batches += len(sizes)
         self.squared_sizes += int(np.square(sizes).sum())
@@ -130,12 +131,12 @@ class _Count:
 
     @property
     def share(self) -> Array:
-        """Mean over photons (n,)."""
+        """Mean over the photons (n,)."""
         return self.sum / self.photons
 
     @property
     def error(self) -> Array:
-        """Standard error of `share` (n,): the spread of batches about what they would hold if they were all alike."""
+        """Standard error of `share` (n,), from the spread of the batches about their expected tallies."""
         if self.batches == 1:
             return np.full_like(self.sum, np.inf)
         spread = self.squares - 2.0 * self.share * self.products + np.square(self.share) * self.squared_sizes
@@ -143,19 +144,22 @@ class _Count:
 
 
 class _Tracer:
-    """Follows one channel's photons after another's."""
+    """Traces the photons of one channel after another on the GPU."""
 
     def __init__(self, gpu: Gpu, photons: int, innermost: int, sky: bool, bar: Any) -> None:
         self.gpu, self.photons, self.innermost, self.sky, self.bar = gpu, photons, innermost, sky, bar
         self.batch = min(_BATCH, -(-photons // _BATCHES))
         module = wgsl.load(_MODULE)
         self.rings, self.slots = module.constants["RINGS"], module.constants["TALLIES"]
-        # Enough to occupy the device, and few enough that a dispatch takes a moment.
+        # Enough lanes to occupy the device, and few enough for a short dispatch.
         self.lanes = module.constants["LANES"] * (32 if gpu.is_cpu else 2048)
         self.idle = bytes(module.layout("Work").size + module.layout("Photon").size * (self.lanes - 1))
 
-    def follow(self, layers: list[dict[str, float]], key: NDArray[Any]) -> _Count:
-        """Photons through `layers` with the random numbers of `key`: each ring, what was absorbed, and both totals."""
+    def trace(self, layers: list[dict[str, float]], key: NDArray[Any]) -> _Count:
+        """Trace photons through `layers` with the random numbers of `key`.
+
+        Counts the photons of each ring, the absorbed ones, and the totals of both sides.
+        """
         count = _Count()
         for first in range(0, self.photons, _ROUND * self.batch):
             end = min(first + _ROUND * self.batch, self.photons)
@@ -167,17 +171,17 @@ class _Tracer:
         return count
 
     def _round(self, batches: int, photons: int, **bindings: Any) -> Array:
-        """Tallies (batches, slots) of photons of full weight."""
+        """Trace some batches, and return their tallies (batches, slots) in units of a photon of full weight."""
         work, tallies = self.gpu.buffer(self.idle), self.gpu.buffer(bytes(4 * batches * self.slots))
         constants = {"LEAPS": any(layer["transport"] < _ENDLESS for layer in bindings["layers"]), "SKY": self.sky}
-        ended, on_their_way = 0, photons
-        while on_their_way:
+        ended, active = 0, photons
+        while active:
             graph = Graph(self.gpu)
             busy = graph.dispatch(_MODULE, size=self.lanes, work=work, tallies=tallies, constants=constants, **bindings)
             graph.run(busy)
-            on_their_way = int(graph.read(busy).sum())
+            active = int(graph.read(busy).sum())
             taken = int(np.frombuffer(self.gpu.queue.read_buffer(work, 0, 4), np.uint32)[0])
-            self.bar.update(min(taken, photons) - on_their_way - ended)
-            ended = min(taken, photons) - on_their_way
+            self.bar.update(min(taken, photons) - active - ended)
+            ended = min(taken, photons) - active
         counted = np.frombuffer(self.gpu.queue.read_buffer(tallies), np.uint32)
         return counted.reshape(batches, self.slots) / 2.0**21

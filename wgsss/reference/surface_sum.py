@@ -1,4 +1,4 @@
-"""Sums over samples of a surface for many receivers, on the GPU, a moment at a time and kept as they come."""
+"""Sums over samples of a surface for many receivers, on the GPU, in short dispatches with cached partial results."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from wgsss.reference.kernel import Kernel
 Array = npt.NDArray[Any]
 
 _MODULE = "reference/integral"
-_TILE = 1 << 15  # samples of one dispatch: lavapipe ends loops after 65,535 turns, those of nested ones together
+_TILE = 1 << 15  # samples of one dispatch: lavapipe ends loops after 65,535 iterations, those of nested loops added up
 _SUBMISSION = 0.5  # seconds that a dispatch may take
-_GROUPS = 4096  # of receivers in one dispatch, whose lists of blocks stay small
-_FIRST_RATE = 1e7  # pairs of receiver and sample per second that any device manages
-_PART = 1 << 30  # pairs between two entries of the cache, the most that is lost when interrupted
+_GROUPS = 4096  # of receivers in one dispatch, so that their lists of blocks stay small
+_FIRST_RATE = 1e7  # pairs of receiver and sample per second that any device achieves
+_PART = 1 << 30  # pairs per cache entry: an interrupt loses at most these
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of a surface with their normals, in the object's own space: (N, 3) each, mm."""
+    """Points of a surface with their normals, in object space: (N, 3) each, mm."""
 
     position: Array
     normal: Array
@@ -41,10 +41,11 @@ class Points:
 def surface_sum(
     gpu: Gpu, kernel: Kernel, samples: Points, flux: Array, receivers: Points, bar: Any
 ) -> tuple[Array, Array]:
-    """The sums of kernel(|x_i - x_o|) times the `flux` (N, 3) of samples, for each receiver: front and back (M, 3).
+    """Sum kernel(|x_i - x_o|) times the `flux` (N, 3) of the samples, for each receiver. Returns front and back (M, 3).
 
-    Equal arguments give equal bits on one adapter. Parts of the sum are cached as they are done, so that what is
-    interrupted goes on where it was. `bar`, of `console.progress_bar`, counts pairs of a receiver and a sample.
+    Equal arguments give equal bits on one adapter. Each part of the sum is cached when it is done, so that an
+    interrupted computation continues where it was. `bar`, of `console.progress_bar`, counts pairs of a receiver and a
+    sample.
     """
     source = _Source(gpu, kernel, samples, flux)
     order = _along_curve(receivers.position)
@@ -65,7 +66,7 @@ def _part(source: _Source, receivers: Points, bar: Any) -> dict[str, Array]:
 
 
 class _Source:
-    """Samples on the GPU, in blocks whose bounds say which of them a group of receivers needs."""
+    """Samples on the GPU, in blocks. The bounds of a block decide which groups of receivers need it."""
 
     def __init__(self, gpu: Gpu, kernel: Kernel, samples: Points, flux: Array) -> None:
         self.gpu, self.kernel, self.rate = gpu, kernel, _FIRST_RATE
@@ -88,7 +89,7 @@ class _Source:
         self.low, self.high = _bounds(value["position"], self.block)
 
     def summed(self, receivers: Points, bar: Any) -> dict[str, Array]:
-        """The sums for some receivers."""
+        """Return the sums for some receivers: front and back (n, 3)."""
         count = len(receivers.position)
         whole = np.minimum(np.arange(count + -count % self.lanes), count - 1)
         padded = receivers[whole]
@@ -106,16 +107,16 @@ class _Source:
                 some = int(np.clip(self.rate * _SUBMISSION // pairs, 1, min(groups - first, _GROUPS)))
                 chosen = slice(first, first + some)
                 near = _near([b[chosen] for b in bounds], (low, high), self.kernel.reach)
-                found = self._dispatch(buffered, buffer, near, first)
+                part = self._dispatch(buffered, buffer, near, first)
                 lanes = slice(first * self.lanes, (first + some) * self.lanes)
-                sums[0, lanes] += found["front"]
-                sums[1, lanes] += found["back"]
+                sums[0, lanes] += part["front"]
+                sums[1, lanes] += part["back"]
                 first += some
                 bar.update((min(lanes.stop, count) - lanes.start) * min(_TILE, self.count - tile * _TILE))
         return {"front": sums[0, :count], "back": sums[1, :count]}
 
     def _dispatch(self, samples: Any, receivers: Any, near: Array, first: int) -> Array:
-        """The sums over the blocks of one tile that are `near` (groups, blocks) each group."""
+        """Return the sums over one tile, for each group over the blocks that `near` (groups, blocks) selects."""
         start = time.perf_counter()
         graph = Graph(self.gpu)
         sums = graph.dispatch(
@@ -129,21 +130,21 @@ class _Source:
             blocks=np.nonzero(near)[1],
         )
         graph.run(sums)
-        found = graph.read(sums)
+        result = graph.read(sums)
         pairs = int(near.sum()) * self.lanes * self.block
         rate = pairs / (time.perf_counter() - start)
         self.rate = float(np.clip(rate, self.rate / 2, self.rate * 4)) if pairs > 1e5 else self.rate
-        return found
+        return result
 
 
 def _bounds(positions: Array, block: int) -> tuple[Array, Array]:
-    """The least and greatest coordinates (n, 3) of each block of positions."""
+    """Return the least and greatest coordinates (n, 3) of each block of positions."""
     blocks = positions.reshape(-1, block, 3)
     return blocks.min(axis=1), blocks.max(axis=1)
 
 
 def _near(a: Any, b: Any, reach: float) -> Array:
-    """bool (n, m): which boxes `a` (low, high; (n, 3) each) lie within `reach` of which boxes `b`."""
+    """Return whether box `a` (low, high; (n, 3) each) lies within `reach` of box `b`, for all pairs: bool (n, m)."""
     (a_low, a_high), (b_low, b_high) = a, b
     square = np.zeros((len(a_low), len(b_low)))
     for axis in range(3):
@@ -153,5 +154,5 @@ def _near(a: Any, b: Any, reach: float) -> Array:
 
 
 def _along_curve(positions: Array) -> Array:
-    """An order of positions in which neighbours are near each other."""
+    """Return an order of positions in which neighbours are near each other."""
     return np.argsort(morton(positions), kind="stable")

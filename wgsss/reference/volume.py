@@ -1,4 +1,4 @@
-"""`volume`: the scene itself, by Mitsuba 3, without a diffusion profile or any other model of what happens inside."""
+"""The reference `volume`: volumetric path tracing by Mitsuba 3, without a diffusion profile or other model."""
 
 from __future__ import annotations
 
@@ -24,37 +24,40 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class Volume(Reference):
-    """M as the light that has been scattered inside makes it, by following paths; M_back is part of M_front.
+    """M by volumetric path tracing. M_back is part of M_front.
 
-    Of the radiance L that leaves towards the camera, L_0 never was scattered: the surface reflected it, or it went
-    straight through. A second rendering, in which the media absorb what they would scatter, tells it, and what is left
-    is read as our frame would show it, L - L_0 = rho_dt / pi M. Where no boundary reflects, L_0 is what the camera sees
-    of the lights themselves, and is left out.
+    The radiance L that leaves towards the camera contains light L_0 that was never scattered: the surface reflected it,
+    or it passed straight through. A second rendering, in which the media absorb instead of scattering, gives L_0. The
+    rest is converted to M by the equation of our composite pass, L - L_0 = rho_dt / pi M. If no boundary reflects, L_0
+    is only the light sources that the camera sees directly, and it is left out.
 
-    Paths begin in the middle of a pixel, where our frame looks too; each channel is followed on its own.
+    Paths start at the centre of a pixel, like the points that our frames shade. Each channel is traced separately.
 
-    Under a uniform sky, hundreds of paths per pixel do where no boundary reflects. Through a rough boundary, small
-    lights take thousands and more; and that boundary loses light, as Mitsuba's does not follow what one facet sends to
-    another: of a white medium 10 % at an eta of 1.5 and a roughness of 0.35, 35 % at 0.6, nothing at 0.02.
+    Under a uniform sky and without a reflecting boundary, hundreds of paths per pixel are enough. Through a rough
+    boundary, small lights need thousands or more. Such a boundary also loses light, because Mitsuba ignores light that
+    one facet reflects to another: a white medium of eta 1.5 loses 10 % at a roughness of 0.35, 35 % at 0.6, and nothing
+    at 0.02.
     """
 
     samples: int = field(
-        default=256, metadata={"unit": "paths", "range": (2, 1 << 20), "help": "per pixel and channel"}
+        default=256, metadata={"unit": "paths", "range": (2, 1 << 20), "help": "number per pixel and channel"}
     )
 
     source: ClassVar[str] = "Jakob et al. 2022, Mitsuba 3: volumetric path tracing"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = tuple({"samples": n} for n in (64, 256, 1024))
 
     def estimate(self, stage: Stage, size: tuple[int, int]) -> Estimate:
-        """M at `size` (width, height) pixels and its standard error. Batches of paths are cached as they come, so that
-        a run that was stopped goes on, and more samples add to those there are.
+        """Return M at `size` (width, height) pixels and its standard error.
 
-        Raises InputError without Mitsuba, and for scenes that it cannot have (`mitsuba_scene.check`); RenderError where
-        it fails.
+        Each batch of paths is cached when it is done, so that an interrupted run continues, and a larger number of
+        samples adds to the cached ones.
+
+        Raises InputError without Mitsuba, and for scenes that Mitsuba cannot represent (`mitsuba_scene.check`). Raises
+        RenderError if Mitsuba fails.
         """
         scene = stage.scene
         if notes := check(scene):
-            note = f"{scene.name}: volume differs from what else we render: {'; '.join(notes)}"
+            note = f"{scene.name}: volume differs from our methods: {'; '.join(notes)}"
             warnings.warn(note, Note, stacklevel=2)
         bounded = any(thing.material.eta > 1 for thing in scene.objects)
         renderings = [(channel, scatters) for channel in range(3) for scatters in ((True, False)[: 1 + bounded])]
@@ -65,7 +68,7 @@ class Volume(Reference):
             progress_bar(total=len(renderings) * self.samples, desc="volume", unit=" paths/pixel") as bar,
         ):
             for channel, scatters in renderings:
-                mean, square = paths.follow(channel, scatters, self.samples, bar)
+                mean, square = paths.trace(channel, scatters, self.samples, bar)
                 scattered[:, channel] += mean if scatters else -mean
                 variance[:, channel] += square
         to_M = math.pi / pixels.rho_dt[:, None] * pixels.base_color
@@ -73,10 +76,10 @@ class Volume(Reference):
 
 
 class _Pixels:
-    """The pixels (N) in whose middle a body is seen.
+    """The N pixels whose centre shows a body.
 
     Attributes:
-        rays: (N, 6), where the line of sight begins, mm, and its direction.
+        rays: (N, 6), the origin of the line of sight, mm, and its direction.
         rho_dt: (N,), towards the camera.
         base_color: (N, 3), of the body.
     """
@@ -84,13 +87,12 @@ class _Pixels:
     def __init__(self, stage: Stage, size: tuple[int, int]) -> None:
         graph = Graph(stage.gpu)
         frame = begin(graph, stage, size)
-        tables = {key: table for key, table in frame.rho_dt.items()}
-        graph.run(frame.gbuffer.gbuffer_id, frame.gbuffer.normal, *tables.values())
+        graph.run(frame.gbuffer.gbuffer_id, frame.gbuffer.normal, *frame.rho_dt.values())
         body = graph.read(frame.gbuffer.gbuffer_id)[..., 2].astype(int)
-        self._seen = body > 0
-        body = body[self._seen] - 1
-        normal = graph.read(frame.gbuffer.normal)[self._seen].astype(np.float64)
-        self.rays = _rays(frame.view.clip_to_world, size)[self._seen]
+        self._mask = body > 0
+        body = body[self._mask] - 1
+        normal = graph.read(frame.gbuffer.normal)[self._mask].astype(np.float64)
+        self.rays = _rays(frame.view.clip_to_world, size)[self._mask]
 
         towards = -np.einsum("ij,ij->i", normal[:, :3], self.rays[:, 3:]) / np.linalg.norm(normal[:, :3], axis=1)
         entry = np.sqrt(np.clip(towards, 0.0, 1.0))  # as the tables are laid out: wgsl/rho_dt.wgsl
@@ -103,14 +105,14 @@ class _Pixels:
             self.base_color[of] = thing.material.base_color
 
     def image(self, values: Array) -> Array:
-        """Values (N, 3) as float32 (H, W, 3), 0 elsewhere."""
-        image = np.zeros((*self._seen.shape, 3), np.float32)
-        image[self._seen] = values
+        """Return values (N, 3) as an image, float32 (H, W, 3), with 0 elsewhere."""
+        image = np.zeros((*self._mask.shape, 3), np.float32)
+        image[self._mask] = values
         return image
 
 
 def _rays(clip_to_world: Array, size: tuple[int, int]) -> Array:
-    """(H, W, 6): the lines through the middles of the pixels, from where the view begins."""
+    """Return the lines through the centres of the pixels, from the near plane: origin and direction (H, W, 6)."""
     x, y = np.meshgrid((np.arange(size[0]) + 0.5) / size[0], (np.arange(size[1]) + 0.5) / size[1])
     ends = []
     for depth in (0.0, 1.0):

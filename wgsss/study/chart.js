@@ -48,19 +48,19 @@ function shape(method, x, y, r) {
 
 // As `ticks` of scatter.py; for a linear axis, multiples of a round step.
 function ticks(low, high, log) {
-  let found = [];
+  let values = [];
   if (!log) {
     const step = [1, 2, 5, 10, 20, 50].find(s => (high - low) / s <= MOST_TICKS) ?? 100;
-    for (let v = Math.ceil(low / step) * step; v <= high; v += step) found.push(v);
-    return found;
+    for (let v = Math.ceil(low / step) * step; v <= high; v += step) values.push(v);
+    return values;
   }
   for (const mantissas of MANTISSAS) {
-    found = [];
+    values = [];
     for (let d = Math.floor(Math.log10(low)); d <= Math.ceil(Math.log10(high)); d++)
-      for (const m of mantissas) if (m * 10 ** d >= low && m * 10 ** d <= high) found.push(m * 10 ** d);
-    if (found.length <= MOST_TICKS) break;
+      for (const m of mantissas) if (m * 10 ** d >= low && m * 10 ** d <= high) values.push(m * 10 ** d);
+    if (values.length <= MOST_TICKS) break;
   }
-  return found;
+  return values;
 }
 
 // The map from values to pixels `from` to `to`, with the ends of the axis as `axis_limits` of scatter.py.

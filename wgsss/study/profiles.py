@@ -159,7 +159,7 @@ def distances_for(profiles: dict[str, Profile], n: int = SAMPLES) -> Array:
     return np.geomspace(min(r[0] for r in tables), max(r[-1] for r in tables), n)
 
 
-def described(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
+def profile_json(name: str, profile: Profile, r: Array, k: int) -> dict[str, Any]:
     """Return a profile as JSON: its values at `r` (n,) mm, its totals, its range and its fit by `k` Gaussians.
 
     Raises InputError if R is infinite at one of the distances.

@@ -3,19 +3,19 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
 const root = document.documentElement.style;
 const [width, height] = data.size;
-const MOST = 64; // times larger: a pixel of a small picture fills the page
+const LARGEST_ZOOM = 64; // a pixel of a small picture then fills the page
 const state = { light: 0, a: 0, b: 0, at: 50, zoom: 1, x: 0, y: 0 };
 
 function make(tag, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...children);
+  return element;
 }
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 const images = () => data.lights[state.light].images;
 
-// What is shown is told by the state; x and y are where the picture's corner is, in per cent of the view.
+// Apply the state to the page. x and y are the position of the picture's corner in per cent of the view.
 function show() {
   state.x = clamp(state.x, 100 - 100 * state.zoom, 0);
   state.y = clamp(state.y, 100 - 100 * state.zoom, 0);
@@ -25,6 +25,7 @@ function show() {
   document.body.classList.toggle("smooth", (byId("stage").clientWidth / width) * state.zoom < 3);
 }
 
+// Show the two chosen pictures.
 function choose() {
   for (const [key, image, tag] of [["a", "over", "tag-a"], ["b", "under", "tag-b"]]) {
     const chosen = images()[state[key]];
@@ -34,14 +35,16 @@ function choose() {
   }
 }
 
+// Zoom about a point of the view, in per cent.
 function zoomBy(factor, x = 50, y = 50) {
-  const zoom = clamp(state.zoom * factor, 1, MOST);
+  const zoom = clamp(state.zoom * factor, 1, LARGEST_ZOOM);
   state.x = x - ((x - state.x) * zoom) / state.zoom;
   state.y = y - ((y - state.y) * zoom) / state.zoom;
   state.zoom = zoom;
   show();
 }
 
+// Fill the page with the pictures and the figures under the chosen light.
 function fill() {
   const light = data.lights[state.light];
   for (const key of ["a", "b"]) {
@@ -59,13 +62,13 @@ function fill() {
   light.images.forEach((image, i) => {
     const view = make("div", { className: "view" }, make("img", { src: image.source, alt: image.title, draggable: false }));
     movable(view);
-    const shown = i % pictures; // the pictures come first, then their errors
-    if (i === shown) {
+    const card = i % pictures; // the pictures come first, then their error maps
+    if (i === card) {
       const caption = make("figcaption", {}, make("span", { textContent: image.title }));
       caption.append(make("small", { textContent: image.note }), button(i, "a", "left"), button(i, "b", "right"));
       cards.push(make("figure", {}, caption));
     }
-    cards[shown].append(view);
+    cards[card].append(view);
   });
   byId("sheet").replaceChildren(...cards);
   choose();
@@ -73,13 +76,13 @@ function fill() {
 }
 
 function button(index, side, title) {
-  const made = make("button", { textContent: title[0].toUpperCase(), title: "show on the " + title });
-  made.setAttribute("aria-label", made.title);
-  made.onclick = () => { state[side] = index; choose(); };
-  return made;
+  const element = make("button", { textContent: title[0].toUpperCase(), title: "show on the " + title });
+  element.setAttribute("aria-label", element.title);
+  element.onclick = () => { state[side] = index; choose(); };
+  return element;
 }
 
-// Columns from `first` on that hold percentages are tinted by how large they are beside the largest of the table.
+// Fill a table. Percentages from column `first` on get a bar, whose length is relative to the largest one in the table.
 function table(element, rows, first) {
   if (!rows.length) return;
   const head = make("tr", {}, ...rows[0].map((text) => make("th", { textContent: text })));
@@ -95,6 +98,7 @@ function table(element, rows, first) {
   element.replaceChildren(make("thead", {}, head), make("tbody", {}, ...body));
 }
 
+// Draw a stacked bar of the parts of the error for each method.
 function bars(causes) {
   const colours = ["#0072b2", "#d55e00", "#cc79a7", "#009e73"];
   const sum = (parts, sign) => parts.reduce((total, part) => total + Math.max(sign * part, 0), 0);
@@ -125,11 +129,13 @@ function bars(causes) {
   byId("bars").append(make("div", { className: "key" }, ...key, make("span", {}, "│ relative RMSE")));
 }
 
+// The position of the pointer in per cent of a view.
 const place = (event, view) => {
   const box = view.getBoundingClientRect();
   return [(100 * (event.clientX - box.left)) / box.width, (100 * (event.clientY - box.top)) / box.height];
 };
 
+// Let the pointer move and zoom the pictures of a view.
 function movable(view) {
   let last = null;
   view.addEventListener("pointerdown", (event) => {
@@ -147,20 +153,21 @@ function movable(view) {
   });
   for (const end of ["pointerup", "pointercancel"]) view.addEventListener(end, () => (last = null));
   view.addEventListener("wheel", (event) => {
-    if (view.id !== "stage" && !event.ctrlKey) return; // the page must scroll over the small ones
+    if (view.id !== "stage" && !event.ctrlKey) return; // over small pictures the wheel scrolls the page
     event.preventDefault();
     zoomBy(2 ** (-event.deltaY / 250), ...place(event, view));
   }, { passive: false });
   view.addEventListener("dblclick", (event) => zoomBy(2, ...place(event, view)));
 }
 
+// Let the pointer and the keys move the line between the two pictures.
 function slide() {
   const handle = byId("handle"), stage = byId("stage");
-  let held = false;
+  let isDragged = false;
   const move = (at) => { state.at = clamp(at, 0, 100); show(); };
-  handle.addEventListener("pointerdown", (event) => { held = true; handle.setPointerCapture(event.pointerId); });
-  handle.addEventListener("pointermove", (event) => held && move(place(event, stage)[0]));
-  for (const end of ["pointerup", "pointercancel"]) handle.addEventListener(end, () => (held = false));
+  handle.addEventListener("pointerdown", (event) => { isDragged = true; handle.setPointerCapture(event.pointerId); });
+  handle.addEventListener("pointermove", (event) => isDragged && move(place(event, stage)[0]));
+  for (const end of ["pointerup", "pointercancel"]) handle.addEventListener(end, () => (isDragged = false));
   handle.addEventListener("keydown", (event) => {
     const step = event.shiftKey ? 10 : 1;
     const to = { ArrowLeft: state.at - step, ArrowDown: state.at - step, ArrowRight: state.at + step,

@@ -21,7 +21,7 @@ from wgsss.methods.lambert import Lambert
 from wgsss.methods.sam import method as sam
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
-from wgsss.reference.integral import _seen, at_vertices
+from wgsss.reference.integral import at_vertices, pixel_receivers
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     MATERIALS,
@@ -123,7 +123,7 @@ def test_pixels_show_what_lies_between_the_vertices(gpu, monkeypatch, mesh):
     use_sender_map(monkeypatch, random_sender_map)
     found = Passes(stage, size=(40, 30))
     graph = Graph(gpu)
-    seen = _seen(shared.begin(graph, stage, (40, 30)))
+    seen = pixel_receivers(shared.begin(graph, stage, (40, 30)))
     graph.run(seen.place)
     place = graph.read(seen.place)
     here = place[..., 3] == 1
