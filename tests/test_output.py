@@ -1,4 +1,4 @@
-"""Files: what they hold, that nothing is half-written, that what cannot be written is told beforehand."""
+"""Image files: their content, no partial files, and errors before the work starts."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_exr_holds_linear_channels_layers_and_metadata(image: Image, tmp_path: P
         assert found[name].dtype == np.float32
         np.testing.assert_array_equal(found[name], image.pixels[..., i])
     np.testing.assert_array_equal(found["normal.Y"], image.aovs["normal"][..., 1])
-    assert found["depth.Z"][0].tolist() == [0] * WIDTH  # nothing seen: coverage tells, and infinity never gets out
+    assert found["depth.Z"][0].tolist() == [0] * WIDTH  # no object: coverage is 0 and infinity is not written
     np.testing.assert_array_equal(found["depth.Z"][1:], image.aovs["depth"][1:, :, 0])
     assert header["wgsss.method"] == "deon07"
 

@@ -1,4 +1,4 @@
-"""Scenes as glTF files: what is written is read again."""
+"""Export of scenes as glTF: written files are read again."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CAMERA = PerspectiveCamera((10, 20, 300), (0, 5, 0), (0, 1, 0.5), fov=25)
 
 
 def scene(**fields: Any) -> Scene:
-    """A tetrahedron of marble, turned and moved."""
+    """Return a scene with a rotated and moved tetrahedron of marble."""
     mesh = fields.pop("mesh", Mesh(POSITIONS, FACES, name="block"))
     thing = Object(mesh, fields.pop("material", MATERIALS["marble"]), (5, 6, 7), (30, 40, 50))
     return Scene("test", **{"objects": (thing,), "lights": (), "camera": CAMERA, **fields})
@@ -49,7 +49,7 @@ def round_trip(given: Scene, path: Path) -> Contents:
 
 
 def placed(contents: Contents) -> Any:
-    """The corners (F, 3, 3) of the one part, in mm."""
+    """Return the corners (F, 3, 3) of the only part, mm."""
     (part,) = contents.parts
     assert contents.mm_per_unit == 1000
     return 1000 * (part.positions @ part.matrix[:3, :3].T + part.matrix[:3, 3])[part.faces]

@@ -1,4 +1,4 @@
-"""Diffusion against photons: how near it comes, and where it is known to fail."""
+"""Diffusion models against photons: how accurate they are, and where they are known to fail."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wgsss.optics import BetterDipole, Dipole, Layer, Layers, Multipole, Photons
 from wgsss.reference.photons import trace
 
 SKIN1 = ((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
-# 004 table 3, after Donner and Jensen 2006
+# Mikkelsen 2009, table 3, after Donner & Jensen 2006
 TWO_LAYERS = [Layer((0.005,) * 3, (1.3,) * 3, 1.4, thickness=6.0), Layer((0.01,) * 3, (1.0,) * 3, 1.4)]
 
 
@@ -19,7 +19,7 @@ def skin() -> Photons:
 
 
 def rings(profile: Profile, edges: np.ndarray) -> np.ndarray:
-    """What leaves between each two radii (n, 3)."""
+    """Return the light that leaves between successive radii (n, 3)."""
     return -np.diff(profile.beyond(edges), axis=0) * profile.total
 
 
@@ -32,7 +32,7 @@ def test_two_layers_within_12_percent_and_2_5_in_total():
 
 
 def test_dipole_of_skin1_in_red_within_10_percent_from_2_5_mm_and_not_nearer(skin):
-    """Near the light diffusion misses what has scattered once; around a mean free path, 1.3 mm, it gives too much."""
+    """Close to the light, diffusion lacks single scattering. Around one mean free path, 1.3 mm, it is too bright."""
     dipole = Dipole(*SKIN1)
     edges = np.array([0.0, 0.25, 1.0, 1.6, 2.5, 4.0, 6.0, 9.0, 13.0])
     ratio = (rings(dipole, edges) / rings(skin, edges))[:, 0]
@@ -41,14 +41,14 @@ def test_dipole_of_skin1_in_red_within_10_percent_from_2_5_mm_and_not_nearer(ski
 
 
 def test_better_dipole_misses_single_scattering(skin):
-    """Its total for Skin1 is 7.8, 24 and 39 % below that of photons, and that of milk is within 1 %."""
+    """Its total for Skin1 is 7.8, 24 and 39 % below that of photons. For milk it is within 1 %."""
     np.testing.assert_allclose(1 - BetterDipole(*SKIN1).total / skin.total, [0.078, 0.24, 0.39], atol=0.015)
     milk = ((0.0011, 0.0024, 0.014), (2.55, 3.21, 3.77), 1.3)
     np.testing.assert_allclose(BetterDipole(*milk).total, trace([Layer(*milk)], 30_000).total, rtol=0.02)
 
 
 def test_thick_white_slabs_within_2_percent():
-    """A slab of more than four mean free paths and a high albedo: R within 1 %, T within 2 %, and noise."""
+    """For slabs thicker than four mean free paths with a high albedo, R is within 1 % and T within 2 %, plus noise."""
     medium = ((0.0021, 0.0041, 0.0071), (2.19, 2.62, 3.0), 1.5)
     slab, photons = Multipole(*medium, thickness=4.0), trace([Layer(*medium, thickness=4.0)], 60_000, seed=2)
     np.testing.assert_allclose(slab.total, photons.total, rtol=0.02)

@@ -1,4 +1,4 @@
-"""The surface integral by brute force against closed forms, and what it does when it is stopped or cannot converge."""
+"""The surface integral by brute force against closed forms, and after an interrupt or without convergence."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SUN = DirectionalLight((0, -1, 0), (2.0, 2.0, 2.0))
 
 
 class Bar:
-    """What counts pairs, when nobody looks."""
+    """Counts pairs like a progress bar, without output."""
 
     n = 0
 
@@ -54,7 +54,7 @@ class Bar:
 
 
 def random_points(mesh: Mesh, count: int, seed: int = 0) -> Samples:
-    """Random places on a mesh."""
+    """Return random points on a mesh."""
     rng = np.random.default_rng(seed)
     faces = rng.integers(0, len(mesh.faces), count).astype(np.int32)
     return Samples(faces, rng.dirichlet([1, 1, 1], count), np.zeros(count))
@@ -65,7 +65,7 @@ def rms(values: Any) -> Any:
 
 
 def distances(kernel: Kernel) -> Any:
-    """Of a kernel's rows, mm."""
+    """Return the distances of the rows of a kernel, mm."""
     bits = kernel.first + np.arange(len(kernel.table) // 2, dtype=np.uint32)
     return np.sqrt((bits << 15).view(np.float32).astype(float))
 
@@ -73,7 +73,7 @@ def distances(kernel: Kernel) -> Any:
 @pytest.mark.parametrize("profile", [WIDE, SKIN_GAUSSIANS, BURLEY, material("skin1").profile])
 @pytest.mark.parametrize("spacing", [0.1, 1.0])
 def test_a_kernel_conserves_the_total_reflectance(profile: Profile, spacing: float) -> None:
-    """Over the plane: what is taken as near, against a quadrature, and with what is sampled the total."""
+    """Over the plane, the analytic part matches a quadrature, and with the sampled part it gives the total."""
     kernel, radius = make_kernel(profile, spacing, 1e9), RADIUS * spacing
     for channel in range(3):
 
@@ -91,7 +91,7 @@ def test_a_kernel_conserves_the_total_reflectance(profile: Profile, spacing: flo
 
 
 def test_the_sampled_part_is_blurred_over_the_plane() -> None:
-    """Against a blur of an image of it."""
+    """It matches a blurred image."""
     spacing, step = 1.0, 1 / 30
     x = np.arange(-240, 241) * step
     r = np.hypot(x, x[:, None])
@@ -106,8 +106,9 @@ def test_the_sampled_part_is_blurred_over_the_plane() -> None:
 
 
 def test_sums_are_those_of_maisch_and_ropinski_eq_5_13_and_14(gpu: Gpu) -> None:
-    """70,000 samples, more than lavapipe's loops turn, in a box wider than the profile's range. On a lattice and along
-    its axes, many lie in a receiver's plane and at right angles to it: neither is behind it."""
+    """There are 70,000 samples, more than the iterations of lavapipe's loops, in a box wider than the profile's
+    range. The samples lie on a lattice, so that many lie in a receiver's tangent plane with a perpendicular
+    normal. They do not count as back."""
     rng = np.random.default_rng(1)
     count, receivers = 70_000, 70
     box, axes = np.array([300, 30, 30]), np.concatenate([np.eye(3), -np.eye(3)])
@@ -131,14 +132,15 @@ def test_sums_are_those_of_maisch_and_ropinski_eq_5_13_and_14(gpu: Gpu) -> None:
         M = np.where((facing >= 0)[:, None], np.stack(same, axis=1), WIDE.reflectance(np.sqrt(square))) * flux
         back = (d @ places.normal[i] < 0) & (facing < 0)
         expected[:, i] = M[~back].sum(axis=0), M[back].sum(axis=0)
-    # Here and there the profile's range cuts off what falls behind it, 1e-5 of its light.
+    # Both omit light beyond the profile's range, 1e-5 of the total.
     np.testing.assert_allclose(found, expected, rtol=5e-5)
     again = surface_sum.surface_sum(gpu, kernel, samples, flux, places, Bar())
     np.testing.assert_array_equal(found, again)
 
 
 def test_a_uniformly_lit_sphere(gpu: Gpu) -> None:
-    """A chord r away, a sphere has the area 2 pi r dr; what is opposed begins at sqrt(2) a. Moved and turned."""
+    """Chords of length r to r + dr cover the area 2 pi r dr. Normals are opposed from sqrt(2) a on. The sphere is
+    moved and rotated."""
     a, at = 3.0, (30.0, -5.0, 2.0)
     ball = Object(shapes.sphere(a, vertices=1500), replace(SOFT, specular=1.0), translate=at, rotate=(20, 30, 40))
     camera = OrthographicCamera((at[0], at[1], 50), at, height=7)
@@ -160,7 +162,7 @@ def test_a_uniformly_lit_sphere(gpu: Gpu) -> None:
 
 @pytest.mark.parametrize(("thickness", "vertices"), [(2.0, 6000), (0.3, 3000)])
 def test_a_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -> None:
-    """The thin one is thinner than the radius within which samples give way to a plane: its far face must not."""
+    """The thin slab is thinner than the radius of the analytic part, which must not apply to its far face."""
     below = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=2)
     up = DirectionalLight((0, 1, 0), (2.0, 2.0, 2.0))
     scene = lit(up, mesh=shapes.slab((30, thickness, 30), vertices), material=SOFT, camera=below)
@@ -175,7 +177,7 @@ def test_a_slab_lit_on_the_far_face(gpu: Gpu, thickness: float, vertices: int) -
 
 
 def _under(mesh: Mesh, height: float) -> tuple[Any, Any, Any]:
-    """Places on the faces of a slab's top within 2 mm of its middle."""
+    """Return points on the faces of a slab's top within 2 mm of its centre."""
     middle = mesh.positions[mesh.faces].mean(axis=1)
     faces = np.flatnonzero((middle[:, 1] > 0.99 * height) & (np.abs(middle[:, [0, 2]]).max(axis=1) < 2)).astype(
         np.int32
@@ -185,9 +187,9 @@ def _under(mesh: Mesh, height: float) -> tuple[Any, Any, Any]:
 
 @pytest.mark.parametrize("profile", [SKIN_GAUSSIANS, BURLEY], ids=["skin", "burley"])
 def test_a_half_lit_plane(gpu: Gpu, profile: Profile) -> None:
-    """By a base colour applied before diffusion, white beyond a straight edge: two spacings away from it M is the
-    integral of the line spread function. Skin's narrowest Gaussian is narrower than samples are apart, Burley's profile
-    has no limit at 0."""
+    """The base colour, applied before diffusion, is white beyond a straight edge. Two spacings from the edge, M is the
+    integral of the line spread function. The narrowest Gaussian of skin is narrower than the spacing, and Burley's
+    profile is unbounded at 0."""
     color = np.zeros((1, 1000, 3), np.uint8)
     color[:, 470:] = 255
     side, spacing = 24.0, 0.15
@@ -243,7 +245,7 @@ def test_base_colour_and_a_profile_of_another_kind(gpu: Gpu) -> None:
 
 
 def test_light_stays_in_the_object_that_it_enters(gpu: Gpu) -> None:
-    """A plane half a millimetre below a lit one, in its shadow."""
+    """A plane lies half a millimetre below a lit one, in its shadow."""
     below = OrthographicCamera((0, -50, 0), (0, 0, 0), up=(0, 0, -1), height=4)
     hidden = Object(plane(20, y=-0.5), SOFT)
     found = integral(Stage(gpu, lit(SUN, material=SOFT, camera=below, extra=(hidden,))), (4, 4), samples=20_000)
@@ -251,7 +253,7 @@ def test_light_stays_in_the_object_that_it_enters(gpu: Gpu) -> None:
 
 
 def test_pixels_of_a_half_lit_plane(gpu: Gpu) -> None:
-    """Of two triangles: where on them a pixel is matters."""
+    """The plane has two triangles, so that the barycentric coordinates of the pixels matter."""
     color = np.zeros((1, 1000, 3), np.uint8)
     color[:, 500:] = 255
     striped = replace(SOFT, color_after=0.0, maps=replace(MATTE.maps, base_color=color))
@@ -261,7 +263,7 @@ def test_pixels_of_a_half_lit_plane(gpu: Gpu) -> None:
 
 
 def test_each_object_has_its_own_profile(gpu: Gpu) -> None:
-    """Two planes side by side, each lit alike all over."""
+    """Two planes side by side, each uniformly lit."""
     scene = lit(SUN, extra=(Object(plane(10), SOFT, translate=(5.5, 0, 0)),))
     scene = replace(scene, objects=(Object(plane(10), SOFT, translate=(-5.5, 0, 0)), *scene.objects[1:]))
     profiles = {i: SumOfGaussians(np.array([0.5]), np.full((1, 3), 0.3 + 0.4 * i)) for i in (0, 1)}

@@ -1,4 +1,4 @@
-"""Photons in flat layers against exact results of transport, and what the result says of itself."""
+"""Photons in flat layers against exact results of transport theory, and the properties of the result."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def skin(gpu) -> Photons:
 
 
 def within(found, error, wanted, errors=3.0, least=0.0):
-    """Whether what was found is as near to what is wanted as its standard error says, rounding of `least` apart."""
+    """Whether a value is within its standard error of the target, with an additional rounding error of `least`."""
     assert np.all(error < 0.03 * np.abs(found) + 1e-9), "too few photons to tell"
     np.testing.assert_array_less(np.abs(found - wanted), errors * error + least)
 
 
 def fresnel(mu, eta):
-    """Reflectance at a cosine `mu` from within, for an index of `eta` over that outside."""
+    """Return the reflectance at a cosine `mu` from inside, for an index of `eta` relative to the outside."""
     inside = np.sqrt(np.maximum(1 - eta**2 * (1 - mu**2), 0))
     s = (eta * mu - inside) / (eta * mu + inside)
     t = (mu - eta * inside) / (mu + eta * inside)
@@ -41,11 +41,11 @@ def fresnel(mu, eta):
 
 
 def half_space(albedo: float, boundary=lambda mu: 0 * mu, critical: float = 0.5, sky: bool = False) -> float:
-    """Reflectance of a half space that scatters isotropically, under a boundary that reflects `boundary(mu)` inside.
+    """Return the reflectance of an isotropically scattering half space whose boundary reflects `boundary(mu)` inside.
 
-    By Chandrasekhar's H: of a beam in at `nu`, albedo / 2 H(mu) H(nu) mu / (mu + nu) leaves per mu, and what the
-    boundary reflects of it comes in again. `critical` is a cosine at which the boundary is not smooth. An even sky
-    is as bright below the boundary, but for what that reflects.
+    By Chandrasekhar's H function: of a beam that enters at `nu`, albedo / 2 H(mu) H(nu) mu / (mu + nu) leaves per mu,
+    and the part that the boundary reflects enters again. `critical` is a cosine at which the boundary is not smooth. A
+    uniform sky has the same radiance below the boundary, except for the reflected part.
     """
     x, w = np.polynomial.legendre.leggauss(100)
     x, w = 0.5 * (x + 1), 0.5 * w
@@ -64,14 +64,14 @@ def half_space(albedo: float, boundary=lambda mu: 0 * mu, critical: float = 0.5,
 
 
 def test_slab_of_van_de_hulst(slab):
-    """Wang, Jacques and Zheng 1995, table 1: R 0.09739 and T 0.66096."""
+    """Wang, Jacques & Zheng 1995, table 1: R 0.09739 and T 0.66096."""
     within(slab.total, slab.total_error, 0.09739, least=5e-6)
     within(slab.total_transmittance, slab.total_transmittance_error, 0.66096, least=5e-6)
 
 
 @pytest.mark.parametrize(("eta", "sky", "of_incident"), [(1.3, False, None), (1.5, True, None), (1.5, False, 0.2600)])
 def test_half_space_of_giovanelli(gpu, eta, sky, of_incident):
-    """Wang, Jacques and Zheng 1995, table 2: 0.2600 with what the surface reflects at once; and to more digits."""
+    """Wang, Jacques & Zheng 1995, table 2: 0.2600 including surface reflection. Here to more digits."""
     photons = trace([Layer((1, 1, 1), (9, 9, 9), eta)], 200_000, sky=sky, gpu=gpu)
     exact = half_space(0.9, lambda mu: fresnel(mu, eta), np.sqrt(1 - eta**-2), sky)
     within(photons.total, photons.total_error, exact)
@@ -81,7 +81,7 @@ def test_half_space_of_giovanelli(gpu, eta, sky, of_incident):
 
 
 def test_half_space_under_glass(gpu):
-    """Rays refracted by a clear layer of an index between the half space's and air's."""
+    """Rays are refracted by a clear layer whose index lies between that of the half space and that of air."""
     inner, outer = 1.5, 1.25
 
     def boundary(mu):
@@ -101,7 +101,7 @@ def test_half_space_under_glass(gpu):
 
 
 def test_gap_above_a_half_space_is_air(gpu):
-    """A layer of air that does next to nothing: now photons meet the half space's surface from above."""
+    """A layer of air that hardly interacts. Photons then meet the surface of the half space from above."""
     gap = Layer((0, 0, 0), (1e-6, 1e-6, 1e-6), 1.0, thickness=0.5)
     photons = trace([gap, Layer((1, 1, 1), (9, 9, 9), 1.5)], 100_000, gpu=gpu)
     assert photons.specular == 0
@@ -111,7 +111,8 @@ def test_gap_above_a_half_space_is_air(gpu):
 
 
 def test_refraction_sets_where_light_leaves(gpu):
-    """From a dark half space whose paths are short, through 1 mm of clear glass: its tangent to the normal in mm."""
+    """From a dark half space with short paths through 1 mm of clear glass: the radius in mm is the tangent of the
+    angle."""
     inner, outer, albedo = 1.5, 1.2, np.full(3, 0.2)
     glass = Layer((0, 0, 0), (1e-6, 1e-6, 1e-6), outer, thickness=1.0)
     photons = trace([glass, Layer(1e4 * (1 - albedo), 1e4 * albedo, inner)], 200_000, gpu=gpu)
@@ -131,7 +132,7 @@ def test_refraction_sets_where_light_leaves(gpu):
 
 @pytest.mark.parametrize("albedo", [(0.3, 0.6, 0.9), (0.99, 0.9999, 0.99999)])
 def test_half_spaces_of_chandrasekhar(gpu, albedo):
-    """The last two are clear enough for leaps."""
+    """In the last two, photons leap."""
     sigma_t = np.array([1.0, 2.0, 5.0])
     layer = Layer(sigma_t * (1 - np.array(albedo)), sigma_t * albedo, 1.0)
     for sky in (False, True):
@@ -140,7 +141,8 @@ def test_half_spaces_of_chandrasekhar(gpu, albedo):
 
 
 def test_light_far_away_without_absorption(gpu):
-    """What diffuses there came from a depth of H(1) / sqrt(3) mean free paths, beyond the extrapolated boundary."""
+    """The light that diffuses there comes from a depth of H(1) / sqrt(3) mean free paths beyond the extrapolated
+    boundary."""
     photons = trace([Layer((0, 0, 0), (1, 2, 5), 1.0)], 50_000, gpu=gpu)
     np.testing.assert_allclose(photons.total, 1, rtol=1e-12)
     small = 1e-8
@@ -151,7 +153,8 @@ def test_light_far_away_without_absorption(gpu):
 
 
 def test_photons_leap_through_a_thick_slab(gpu):
-    """Through a slab that absorbs nothing goes the depth above over the slab's, between extrapolated boundaries."""
+    """The transmitted share of a slab without absorption is that depth over the thickness between extrapolated
+    boundaries."""
     small, thickness = 1e-8, 56.0
     depth = (1 - half_space(1 - small)) / np.sqrt(small) / np.sqrt(3)
     photons = trace([Layer((0, 0, 0), (1, 1, 1), 1.0, thickness=thickness)], 200_000, gpu=gpu)
@@ -161,7 +164,7 @@ def test_photons_leap_through_a_thick_slab(gpu):
 
 @pytest.mark.parametrize("side", ["R", "T"])
 def test_single_scattering_by_distance(gpu, side):
-    """Scattered once at a depth z, isotropically, and out: an integral over z."""
+    """Single isotropic scattering at a depth z: an integral over z."""
     albedo, sigma_t, thickness = 0.01, 2.0, 0.6
     photons = trace(
         [Layer(sigma_t * (1 - albedo) * np.ones(3), sigma_t * albedo * np.ones(3), 1.0, thickness)], 400_000, gpu=gpu
@@ -187,7 +190,7 @@ def test_single_scattering_by_distance(gpu, side):
 
 
 def test_clear_layers_absorb_by_beer_and_reflect_by_fresnel(gpu):
-    """Straight down through two layers of different index and up again, any number of times."""
+    """Straight down and up again through two layers of different index, any number of times."""
     eta, sigma_a, thickness = (1.0, 1.4, 1.9, 1.2), (0.5, 0.3), (0.4, 0.9)
     layers = [
         Layer((s, s, s), (1e-6, 1e-6, 1e-6), n, thickness=t)
@@ -233,7 +236,7 @@ def test_energy_is_conserved(slab, skin):
 
 def test_results_are_reproducible(gpu, monkeypatch):
     first = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
-    monkeypatch.setattr(gpu, "is_cpu", not gpu.is_cpu)  # another number of lanes, hence another order of events
+    monkeypatch.setattr(gpu, "is_cpu", not gpu.is_cpu)  # changes the number of lanes and the order of execution
     monkeypatch.setattr("wgsss.reference.photons._ROUND", 10)  # batches: seven rounds instead of one
     again = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
     other = trace([SLAB, SLAB], 3_000, seed=8, gpu=gpu)
@@ -247,7 +250,9 @@ def test_standard_errors_match_the_spread_of_repetitions(gpu):
     for name in ("total", "total_transmittance"):
         found = np.array([getattr(run, name) for run in runs])
         errors = np.array([getattr(run, f"{name}_error") for run in runs])
-        assert found.std() == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.2)  # of 120: 6.5 % is one error
+        assert found.std() == pytest.approx(
+            np.sqrt(np.mean(np.square(errors))), rel=0.2
+        )  # 120 repetitions: one standard error is 6.5 %
     rings = slice(60, 160)
     found = np.array([run.R[rings].mean(axis=1) for run in runs])
     errors = np.array([np.sqrt(np.sum(np.square(run.R_error[rings]), axis=1)) / 3 for run in runs])
@@ -290,8 +295,9 @@ def test_channels_have_their_own_random_numbers(slab):
 
 
 @pytest.fixture
-def made(skin) -> tuple[Photons, Dipole]:
-    """What photons would count if they were a dipole's, with a share outside of the last ring, and the dipole."""
+def counted(skin) -> tuple[Photons, Dipole]:
+    """Return the counts that photons would have if they followed a dipole's profile, with a share outside the last
+    ring, and the dipole."""
     dipole = Dipole((0, 0.001, 0.03), (1, 2, 3), 1.3)
     edges = skin.edges[skin.edges < 60]
     share = dipole.total * (dipole.beyond(edges[:-1]) - dipole.beyond(edges[1:]))
@@ -301,8 +307,8 @@ def made(skin) -> tuple[Photons, Dipole]:
     return Photons(edges, R, none, 2 * R, none, outside, 2 * outside, zero, zero, zero, 0.0, 1), dipole
 
 
-def test_counts_can_be_used_as_a_profile(made):
-    photons, dipole = made
+def test_counts_can_be_used_as_a_profile(counted):
+    photons, dipole = counted
     np.testing.assert_allclose(photons.total, dipole.total, rtol=1e-9)
     np.testing.assert_allclose(photons.total_transmittance, 2 * dipole.total, rtol=1e-9)
     r = np.geomspace(0.02, 40, 60)

@@ -1,4 +1,5 @@
-"""Scenes for Mitsuba, and `volume` against what is known of light in media. Without Mitsuba, half of it is skipped."""
+"""The export of scenes to Mitsuba, and the reference `volume` against known solutions. Tests that need Mitsuba may
+be skipped."""
 
 from __future__ import annotations
 
@@ -73,7 +74,7 @@ def value(element: ElementTree.Element, name: str) -> list[float]:
 
 
 def test_meshes_are_written_in_world_space(tmp_path):
-    """Read back, a mesh has its placed positions and its own normals, hard edges too."""
+    """The written mesh has the positions in world space and its own normals, also at hard edges."""
     plate = Object(shapes.slab((8, 6, 2), 200), MATCHED, translate=(1, 2, 3), rotate=(20, 30, 40))
     with pytest.warns(UserWarning, match="through the air"):
         files = export(Scene("two", (Object(BALL, MATCHED), plate), (SKY,), CAMERA), tmp_path, (8, 8))
@@ -93,7 +94,7 @@ def test_a_medium_scatters_by_its_reduced_coefficients():
     assert medium.find("phase").attrib["type"] == "isotropic"
 
 
-def test_one_channel_is_grey():
+def test_a_scene_of_one_channel_is_grey():
     scene = ball(SKY, PointLight((0, 90, 0), (1, 2, 3)), medium=material("skin1"))
     root = xml(scene, channel=2)
     medium = root.find("shape/medium")
@@ -116,7 +117,7 @@ def test_boundary(eta, roughness, kind):
 
 
 def test_no_path_ends_by_chance_while_it_carries_light():
-    """After n events a hundredth of the light is left: albedo^n = 0.01."""
+    """After n events, a hundredth of the light is left: albedo^n = 0.01."""
     integrator = xml(ball(SKY, medium=material("skin1"))).find("integrator")
     assert value(integrator, "rr_depth") == [math.ceil(math.log(0.01) / math.log(0.74 / 0.772))]
     assert value(xml(ball(SKY)).find("integrator"), "rr_depth") == [4096]
@@ -124,7 +125,7 @@ def test_no_path_ends_by_chance_while_it_carries_light():
 
 @pytest.mark.parametrize(("channel", "integrator", "bsdf"), [(None, "volpathmis", "diffuse"), (1, "volpath", "null")])
 def test_lights_let_other_light_through_if_the_integrator_supports_it(channel, integrator, bsdf):
-    """Found with Mitsuba 3.9: behind a lamp without a boundary, volpathmis counts the sky twice."""
+    """With Mitsuba 3.9, volpathmis counts the sky behind a light without a boundary twice."""
     root = xml(ball(SKY, LIGHTS["sphere"]), channel=channel)
     assert root.find("integrator").attrib["type"] == integrator
     lamp = root.find("shape[@type='sphere']")
@@ -135,7 +136,7 @@ def test_lights_let_other_light_through_if_the_integrator_supports_it(channel, i
 
 
 def test_environments_are_summed(tmp_path):
-    """Mitsuba has one: constants go into one, and into the image where there is one."""
+    """Mitsuba supports one environment: constants are summed, and added to the image if there is one."""
     import OpenEXR
 
     two = ball(SKY, EnvironmentLight((1, 1, 1)))
@@ -146,7 +147,7 @@ def test_environments_are_summed(tmp_path):
     assert np.allclose(found - sky.pixels(), (2, 3, 5), rtol=1e-5)
 
 
-# What is refused, and what is told.
+# Errors and warnings.
 
 OPEN = Mesh(BALL.positions, BALL.faces[1:])
 SUN, LAMP = DirectionalLight((0, 0, -1), (1, 1, 1)), PointLight((0, 0, 50), (1, 1, 1))
@@ -157,7 +158,10 @@ SUN, LAMP = DirectionalLight((0, 0, -1), (1, 1, 1)), PointLight((0, 0, 50), (1, 
     [
         (ball(SKY, medium=material("skin")), "not gaussians"),
         (ball(SKY, mesh=OPEN), "the mesh has holes"),
-        (ball(SUN, medium=replace(MATCHED, eta=1.3, roughness=0.02)), "smooth boundary of 'matched'.*light with a size"),
+        (
+            ball(SUN, medium=replace(MATCHED, eta=1.3, roughness=0.02)),
+            "smooth boundary of 'matched'.*light with a size",
+        ),
         (ball(LAMP, medium=replace(MATCHED, eta=1.3, roughness=0.02)), "smooth boundary"),
         (ball(EnvironmentLight(file="a.exr"), EnvironmentLight(file="b.exr")), "one environment image"),
     ],
@@ -204,10 +208,10 @@ def test_a_folder_that_cannot_be_created_is_an_error(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [PerspectiveCamera, OrthographicCamera])
-def test_rays_go_through_the_middles_of_pixels(kind):
-    """Pixel (3, 0) of 4 x 2: 3/4 to the right of the middle and 1/2 above it."""
+def test_rays_go_through_the_centres_of_pixels(kind):
+    """The centre of pixel (3, 0) of 4 x 2 is 3/4 to the right of the image centre and 1/2 above it."""
     more = {"fov": 2 * math.degrees(math.atan(0.5))} if kind is PerspectiveCamera else {"height": 10.0}
-    camera = kind((0, 0, 10), (0, 0, 0), **more)  # 10 mm high at the target either way
+    camera = kind((0, 0, 10), (0, 0, 0), **more)  # both views are 10 mm high at the target
     rays = _rays(np.linalg.inv(camera.projection(2.0, 5.0, 15.0) @ camera.view()), (4, 2))
     assert rays.shape == (2, 4, 6)
     origin, direction = rays[0, 3, :3], rays[0, 3, 3:]
@@ -264,7 +268,7 @@ def mi():
     ],
 )
 def test_camera(mi, gpu, camera, tmp_path):
-    """Mitsuba's line of sight through the middle of a pixel meets the ball where our frame shows it."""
+    """Mitsuba's ray through the centre of a pixel meets the ball where our frame shows it."""
     scene, size = ball(SKY, camera=camera), (24, 16)
     exported = mi.load_file(str(export(scene, tmp_path, size)[0]))
     shown = Renderer(scene, make_method("lambert"), size, gpu).frame(aovs=["depth"]).aovs["depth"][..., 0]
@@ -279,12 +283,12 @@ def test_camera(mi, gpu, camera, tmp_path):
                 found[y, x] = (np.array(hit.p) - eye) @ forward
     assert 40 < np.isfinite(shown).sum() < 384
     both = np.isfinite(shown) & np.isfinite(found)
-    assert (np.isfinite(shown) != np.isfinite(found)).sum() <= 2  # on the very edge
+    assert (np.isfinite(shown) != np.isfinite(found)).sum() <= 2  # at the edge of the ball
     assert np.abs(found[both] - shown[both]).max() < 0.01
 
 
 def radiance(mi, file, rays, paths):
-    """Mean radiance (N, 3) along rays (N, 6), by `paths` paths each."""
+    """Return the mean radiance (N, 3) along rays (N, 6), from `paths` paths each."""
     scene, sampler = mi.load_file(str(file)), mi.load_dict({"type": "independent"})
     sampler.seed(0)
     found = np.zeros((len(rays), 3))
@@ -296,8 +300,8 @@ def radiance(mi, file, rays, paths):
 
 
 def towards_plus_x(path):
-    """An environment of radiance 1 + 0.5 x + 0.3 y + 0.2 z in the direction x, y, z, by the convention of
-    `EnvironmentLight`; it lays down E = pi (1 + 2/3 (0.5, 0.3, 0.2) n)."""
+    """Write an environment of radiance 1 + 0.5 x + 0.3 y + 0.2 z in the direction x, y, z, by the convention of
+    `EnvironmentLight`. Its irradiance is E = pi (1 + 2/3 (0.5, 0.3, 0.2) n)."""
     import OpenEXR
 
     u, v = np.meshgrid((np.arange(128) + 0.5) / 128, (np.arange(64) + 0.5) / 64)
@@ -320,7 +324,7 @@ LIGHTS = {
 @needs_mitsuba
 @pytest.mark.parametrize("name", LIGHTS)
 def test_lights(mi, gpu, name, tmp_path):
-    """A white ball that scatters at its surface shows E / pi, E being our irradiance."""
+    """A white ball that scatters at its surface has the radiance E / pi, where E is our irradiance."""
     light = LIGHTS[name]
     if name == "image":
         light = replace(light, file=towards_plus_x(tmp_path / "sky.exr"))
@@ -354,7 +358,7 @@ def test_lights(mi, gpu, name, tmp_path):
 
 
 def _to_ball(rays, radius=10.0):
-    """Distance to a ball about the origin, of rays that meet it."""
+    """Return the distance to a ball at the origin along rays that meet it."""
     along = np.einsum("ij,ij->i", rays[:, :3], rays[:, 3:])
     return -along - np.sqrt(along**2 - np.square(rays[:, :3]).sum(axis=1) + radius**2)
 
@@ -367,8 +371,8 @@ def _about_y(degrees):
 @needs_mitsuba
 @pytest.mark.parametrize("by", ["llvm", "scalar"])
 def test_a_ball_without_absorption(gpu, monkeypatch, by):
-    """Under a uniform sky L, what entered leaves: M = pi L, less what went straight through, exp(-sigma_t d) on a line
-    of sight of length d inside. And within its standard error."""
+    """Under a uniform sky of radiance L, the light that enters leaves: M = pi L, minus the share exp(-sigma_t d)
+    that passes straight through on a line of sight of length d inside. The standard error is also checked."""
     if by == "scalar":
         monkeypatch.setattr(mitsuba_paths, "newest_llvm", lambda: None)
     elif newest_llvm() is None:
@@ -386,7 +390,9 @@ def test_a_ball_without_absorption(gpu, monkeypatch, by):
     assert (estimate.error < 0.05 * exact).all()
     assert abs(off.mean()) < 0.35
     assert 0.75 < np.sqrt(np.square(off).mean()) < 1.3
-    assert abs(np.corrcoef(off[..., 0].ravel(), off[..., 1].ravel())[0, 1]) < 0.6  # each has its own random numbers
+    assert (
+        abs(np.corrcoef(off[..., 0].ravel(), off[..., 1].ravel())[0, 1]) < 0.6
+    )  # each channel has its own random numbers
 
     def none(*_, **__):
         raise AssertionError("started again")
@@ -397,7 +403,7 @@ def test_a_ball_without_absorption(gpu, monkeypatch, by):
 
 @needs_mitsuba
 def test_a_smooth_ball_without_absorption(gpu):
-    """Under a uniform sky it is as bright as the sky, whichever way it is seen, and L_0 is what it reflects: M = pi L
+    """Under a uniform sky, the ball has the radiance of the sky in every direction, and L_0 is the reflection: M = pi L
     times the base colour."""
     white = replace(MATCHED, eta=1.4, roughness=0.02, sigma_s_prime=(2.0, 2.0, 2.0), base_color=(1.0, 0.5, 0.25))
     scene = ball(SKY, medium=white, camera=OrthographicCamera((0, 0, 90), (0, 0, 0), height=19.0))
@@ -410,8 +416,8 @@ def test_a_smooth_ball_without_absorption(gpu):
 
 @needs_mitsuba
 def test_slab_of_photons(gpu):
-    """What leaves a slab of skin without a boundary on both sides, over all directions, is what our photons find: two
-    programs that share nothing."""
+    """The light that leaves both sides of a slab of skin without a boundary equals that of our photon tracer, which
+    shares no code with Mitsuba."""
     thickness, light = 2.0, (1.0, 2.0, 4.0)
     skin = replace(material("skin1"), eta=1.0)
     assert skin.sigma_a is not None and skin.sigma_s_prime is not None
@@ -444,8 +450,8 @@ def test_slab_of_photons(gpu):
     ("light", "most"), [(EnvironmentLight((1, 1, 1)), 0.1), (DirectionalLight((-1, 0, 0), (1, 1, 1)), 0.2)]
 )
 def test_ball_by_the_profile_of_photons(gpu, light, most):
-    """On a ball of milk, ten mean free paths in radius, the profile of a half space errs by 8 % under a sky and by
-    18 % under a beam from the side, RMS, besides the noise."""
+    """For a ball of milk with a radius of ten mean free paths, the profile of a half space has an RMS error of 8 %
+    under a sky and 18 % under a beam from the side, plus noise."""
     milk = replace(material("wholemilk"), eta=1.0)
     radius = 10 / (3.21 + 0.0024)
     camera = OrthographicCamera((0, 0, 9 * radius), (0, 0, 0), height=2.05 * radius)
@@ -457,12 +463,13 @@ def test_ball_by_the_profile_of_photons(gpu, light, most):
     square, noise = (np.square(part[seen]).mean() for part in (profile.M - truth.M, truth.error))
     errs = math.sqrt(max(square - noise, 0.0) / np.square(truth.M[seen]).mean())
     assert 0.03 < errs < most
-    assert 0.7 < profile.M[seen].mean() / truth.M[seen].mean() < 1.0  # it gives back what a half space keeps
+    assert 0.7 < profile.M[seen].mean() / truth.M[seen].mean() < 1.0  # a half space absorbs light that leaves the ball
 
 
 @needs_mitsuba
-def test_exported_scene_renders_as_it_is(mi, tmp_path):
-    """All channels at once: as bright as the white ball above where nothing absorbs, darker where something does."""
+def test_mitsuba_renders_an_exported_scene(mi, tmp_path):
+    """With all channels at once, it is as bright as the white ball above where nothing absorbs, and darker
+    elsewhere."""
     medium = replace(MATCHED, sigma_s_prime=(0.3, 0.5, 0.7), sigma_a=(0.0, 0.0, 0.7))
     camera = OrthographicCamera((0, 0, 90), (0, 0, 0), height=4.0)
     file, *_ = export(ball(SKY, medium=medium, camera=camera), tmp_path, (4, 4))
@@ -480,6 +487,9 @@ def test_an_error_of_mitsuba_is_reported(gpu, monkeypatch):
     scene = ball(SKY)
     with Paths(scene, (8, 8), np.zeros((1, 6))) as paths, tqdm(disable=True) as bar:
         paths._variant = "nonsense"
-        with pytest.raises(RenderError, match=r"Mitsuba: the process ended: .*nonsense") as caught, pytest.warns(UserWarning):
+        with (
+            pytest.raises(RenderError, match=r"Mitsuba: the process ended: .*nonsense") as caught,
+            pytest.warns(UserWarning),
+        ):
             paths.trace(0, True, 2, bar)
     assert "\n" not in str(caught.value)

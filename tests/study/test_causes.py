@@ -1,4 +1,4 @@
-"""Errors by cause: vectors worked out by hand, and a chain of stand-ins."""
+"""Errors by cause: vectors computed by hand, and a chain of replaced integrals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def pixels(*values: float) -> np.ndarray:
 
 
 def test_split_by_hand():
-    """Errors at right angles: 3 and 4 of 10 make 5 of 10, to which they add 9/5 and 16/5."""
+    """Orthogonal errors of 3 and 4 of 10 give 5 of 10, to which they contribute 9/5 and 16/5."""
     volume = pixels(6.0, 8.0)  # mean square 50
     by_photons = volume + pixels(0.0, 4.0)
     method = by_photons + pixels(3.0, 0.0)
@@ -55,7 +55,7 @@ def test_parts_sum_to_the_whole():
 
 @pytest.fixture
 def integral(monkeypatch):
-    """An integral that is 3 by the materials' profiles, 2 by others, 1 less without an environment."""
+    """Replace the integral: 3 with the profiles of the materials, 2 with others, and 1 less without an environment."""
     asked = []
 
     def integral(stage, size, *, profiles=None, **knobs):

@@ -113,7 +113,7 @@ def test_mean_irradiance_in_closed_form():
     patch = RectLight((0, 500, 0), (0, -1, 0), (0, 0, 1), 10, 10, (1, 1, 1))
     assert mean_irradiance(floor, (patch,)) == pytest.approx(1e-4 / 0.25, rel=1e-3)
     assert mean_irradiance(floor, (EnvironmentLight((1, 2, 3)),)) == pytest.approx(2 * math.pi)
-    wall = Object(plane(4.0, cells=1), MATTE, rotate=(90, 0, 0))  # four times as large, and all in grazing light
+    wall = Object(plane(4.0, cells=1), MATTE, rotate=(90, 0, 0))  # four times as large, in grazing light
     both = lit(mesh=plane(2.0), extra=(wall,))
     assert mean_irradiance(both, (DirectionalLight((0, -1, 0), (1, 1, 1)),)) == pytest.approx(0.2)
     light = DirectionalLight((1, 2, -3), (8, 8, 8))
@@ -133,4 +133,4 @@ def test_lights_of_all_types_give_the_same_mean_irradiance():
     for name in ("point", "area"):
         assert found[name].lights[0].position[2] < -10.0
     M = lambert(found["environment"], SIZE)[12, 16, 0] / MATTE.profile.total[0]
-    assert 0.9 * wanted < M < wanted  # L_d, in the middle: what got through the surface
+    assert 0.9 * wanted < M < wanted  # the light that enters through the surface, at the image centre

@@ -1,4 +1,4 @@
-"""The table of speed-ups: what is measured, and how it is told."""
+"""The table of speed-ups: the measurement, and the output of the command."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from wgsss.study.jimenez08_speedup import DISTANCES, HEADS, PAPER, UNIT_MM
 
 
 class Clock:
-    """In place of the renderer: frames of deon07 take heads x distance x 10 ms, at first; of the other, a half."""
+    """Replaces the renderer: frames of deon07 take heads x distance x 10 ms at first, and frames of the other half
+    as long."""
 
     made: ClassVar[list[Clock]] = []
 

@@ -1,4 +1,4 @@
-"""Measures of error, against numbers worked out by hand."""
+"""Measures of error against numbers computed by hand."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_flip_is_the_mean_over_the_mask():
     white = np.full_like(black, 255)
     assert errors(M, M, seen, display=black, reference_display=black).flip == 0.0
     flip = errors(M, M, seen, display=white, reference_display=black).flip
-    assert flip is not None and flip > 0.9  # FLIP calls black and white as different as can be
+    assert flip is not None and flip > 0.9  # FLIP of black against white is close to 1
     inside = np.where(seen[..., None], white, black)
     found = errors(M, M, seen, display=inside, reference_display=black).flip
     whole = errors(M, M, np.ones_like(seen), display=inside, reference_display=black).flip

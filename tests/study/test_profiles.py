@@ -1,4 +1,4 @@
-"""Models of one material side by side: which serve it, what is said of them, and the picture."""
+"""Models of one material: which ones apply, their numbers, and the plot."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from wgsss.study.compare import Comparison, compare
 from wgsss.study.report import OWN_LIGHTS, check_folder, page, write_report
 
 SIZE = (48, 32)
-# Whatever a file calls its scene, the page and the sheet show it and run none of it.
+# The page and the sheet show any name of a scene as text and execute nothing.
 NAME = "$\\frac{_ <!--<script></script><b>&amp;\u2028]]>"
 
 
@@ -56,7 +56,7 @@ def folder(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def test_the_report_has_all_files(comparison, folder):
     found = {file.name for file in folder.iterdir()}
-    names = ["reference", "lambert", "integral"]  # a method may be of the reference's kind
+    names = ["reference", "lambert", "integral"]  # the reference can also be one of the methods
     assert found == {
         "report.html",
         "contact_sheet.png",
@@ -91,7 +91,8 @@ def test_linear_images_hold_M(comparison, folder):
 
 
 def test_error_maps_share_a_scale(comparison, folder):
-    """A fifth, and a twenty-fifth, of the same M: on a curve of square roots, colours at places 1 and 1/sqrt(5)."""
+    """Errors of a fifth and a twenty-fifth of the same M take the colours at 1 and 1/sqrt(5), because of the square
+    root."""
     end = error_maps.scale_end(comparison)
     maps = error_maps.maps(comparison)
     most = np.percentile(maps["lambert"][comparison.mask], 99.5)
@@ -182,7 +183,7 @@ MOVES = (
 
 
 def test_page_in_a_browser(tab):
-    """The slider follows the mouse and the keys, all pictures are enlarged together, and the console stays silent."""
+    """The slider follows the mouse and the keys, all pictures zoom together, and the console stays empty."""
     x, y, width, height = tab.run(BOX)
     middle = (x + width / 2, y + height / 2)
     before = tab.run(AT)
@@ -226,7 +227,7 @@ def test_page_in_a_browser(tab):
 
 
 def test_the_pictures_are_cut_at_the_line_at_every_zoom(tab):
-    """What is left of the line is the left picture, to the pixel: asked of the browser's own drawing."""
+    """Left of the line is the left picture, to the pixel, as the browser draws it."""
     _, _, width, _ = tab.run(BOX)
     for enlarge in (0, 3):
         tab.run(f"zoomBy({enlarge}, 20, 60)")
@@ -242,7 +243,7 @@ def test_the_pictures_are_cut_at_the_line_at_every_zoom(tab):
 
 
 def _resolved(clip: str, width: float) -> float:
-    """The right inset of a clip-path, px: per cent, px or a sum of both."""
+    """Return the right inset of a clip-path, px. It is given in per cent, px or a sum of both."""
     right = re.fullmatch(r"inset\(\S+ (.*?)(?: 0px 0px| 0px)?\)", clip)[1]
     parts = re.findall(r"([+-]?)\s*(-?[\d.]+)(%|px)", right)
     return sum((-1 if sign == "-" else 1) * float(n) * (width / 100 if unit == "%" else 1) for sign, n, unit in parts)

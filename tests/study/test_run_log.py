@@ -203,7 +203,7 @@ _open = Path.open
 
 
 def _slow_open(path: Path, *args: Any, room: int = 1 << 30, **rest: Any) -> Any:
-    """A file that takes 7 bytes at a time, until `room` are written."""
+    """Open a file that accepts 7 bytes per write, until `room` bytes are written."""
     if "a" not in args[0]:
         return _open(path, *args, **rest)
 
