@@ -109,9 +109,9 @@ def test_depth_decides_by_layer(gpu, modules):
     modules(near=near, far=far)
     graph = Graph(gpu)
     layers = graph.texture("layers", (4, 4, 2), "depth32float")
-    drawn = graph.draw("near", level=1.0, size=(4, 4), depth_buffer=layers, layer=0)
-    drawn = graph.draw("far", level=2.0, into=drawn.value, depth_buffer=drawn.depth, layer=0)
-    other = graph.draw("far", level=3.0, size=(4, 4), depth_buffer=drawn.depth, layer=1)
+    drawn = graph.draw_outputs("near", level=1.0, size=(4, 4), depth_buffer=layers, layer=0)
+    drawn = graph.draw_outputs("far", level=2.0, into=drawn.value, depth_buffer=drawn.depth, layer=0)
+    other = graph.draw_outputs("far", level=3.0, size=(4, 4), depth_buffer=drawn.depth, layer=1)
     graph.run(drawn.value, other.depth)
     assert (graph.read(drawn.value) == 1).all()
     np.testing.assert_allclose(graph.read(other.depth)[:, 0, 0, 0], [0.2, 0.8])
@@ -126,11 +126,11 @@ def test_compute_makes_and_updates_buffers(graph):
         graph.dispatch("count", size=10, constants={"STOP": 1})
 
 
-def test_misfits_list_what_is_wanted_and_given(graph):
+def test_errors_list_the_bindings_of_the_module_and_of_the_call(graph):
     a = graph.draw("fill", level=1.0, size=(2, 2))
     with pytest.raises(
         WgslError,
-        match=r"add wants left: texture_2d<f32>, right: .*; was given left, rigth; "
+        match=r"add has the bindings left: texture_2d<f32>, right: .*; got left, rigth; "
         r"missing: right; unknown: rigth \(did you mean 'right'\?\)",
     ):
         graph.draw("add", left=a, rigth=a)
@@ -140,6 +140,48 @@ def test_misfits_list_what_is_wanted_and_given(graph):
         graph.draw("add", left=a, right=graph.texture("t", (2, 2, 1), "rgba32float"))
     with pytest.raises(WgslError, match="give a size"):
         graph.draw("fill", level=1.0)
+
+
+def test_draw_and_dispatch_refuse_modules_with_several_outputs(graph):
+    with pytest.raises(WgslError, match="fill has the outputs value, depth: use draw_outputs"):
+        graph.draw("fill", level=1.0, size=(2, 2), depth_buffer="new")
+    outputs = graph.draw_outputs("fill", level=1.0, size=(2, 2), depth_buffer="new")
+    assert list(outputs) == ["value", "depth"] and outputs.depth is outputs["depth"]
+    with pytest.raises(AttributeError, match="the pass writes value, depth, and no 'dept'"):
+        _ = outputs.dept
+
+
+SHARED = """
+@group(1) @binding(0) var<uniform> level: f32;
+@group(1) @binding(1) var<uniform> other: f32;
+fn doubled(other: f32) -> f32 { return 2.0 * other; }
+fn tripled() -> f32 { return 3.0 * other; }
+"""
+USES_SHARED = (
+    "import package::shared::{level, doubled};\n"
+    + SCREEN
+    + "@fragment fn fs() -> Out { let tripled = 1.0; return Out(vec4f(tripled * doubled(level))); }"
+)
+
+
+def test_imported_bindings_that_no_entry_point_uses_are_not_bound(gpu, modules):
+    modules(shared=SHARED, uses=USES_SHARED)
+    graph = Graph(gpu)
+    value = graph.draw("uses", level=3.0, size=(2, 2))
+    graph.run(value)
+    assert (graph.read(value) == 6).all()
+    with pytest.raises(WgslError, match=r"unknown: other \(no entry point uses it\)"):
+        graph.draw("uses", level=3.0, other=1.0, size=(2, 2))
+
+
+def test_bindings_of_two_files_with_one_number_are_refused(gpu, modules):
+    modules(
+        shared=SHARED,
+        more="@group(1) @binding(0) var<uniform> more: f32;",
+        uses="import package::more::{more};\n" + USES_SHARED.replace("doubled(level)", "doubled(level + more)"),
+    )
+    with pytest.raises(WgslError, match=r"uses: more and level are both @group\(1\) @binding\(0\)"):
+        Graph(gpu).draw("uses", level=3.0, more=1.0, size=(2, 2))
 
 
 def test_times_say_which_clock(graph, gpu):

@@ -1,4 +1,4 @@
-"""The adapter and its device, what lives on it from frame to frame, and the way there and back."""
+"""The GPU device: textures and buffers, the pool that they come from, samplers and pipelines, and reading back."""
 
 from __future__ import annotations
 
@@ -6,21 +6,29 @@ import os
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.errors import InputError
 from wgsss.scene.images import MAX_SIDE
 
+if TYPE_CHECKING:
+    import wgpu
+
+Buffer: TypeAlias = "wgpu.GPUBuffer"
+Texture: TypeAlias = "wgpu.GPUTexture"
+
 os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())  # unset, it makes drivers print noise
 
-# What is asked of every adapter: WebGPU's own defaults. Asking for nothing would grant the adapter's limits, and what
-# runs on a generous software driver would then fail on a GPU.
+# The limits that every device is created with: WebGPU's defaults. Without them a device has the limits of its adapter,
+# and a pass that runs with those of a software driver could fail on a GPU.
 LIMITS = {
     "max-texture-dimension-2d": MAX_SIDE,
     "max-texture-array-layers": 256,
@@ -44,7 +52,7 @@ LIMITS = {
     "min-storage-buffer-offset-alignment": 256,
 }
 
-# The graphics interfaces that are asked for adapters: wgpu's names of them, and those that adapters give.
+# The graphics APIs whose adapters are considered: their names in wgpu, and those that adapters report.
 BACKENDS = {
     "darwin": {"Metal": "Metal"},
     "win32": {"Vulkan": "Vulkan", "DX12": "D3D12"},
@@ -75,7 +83,7 @@ FORMATS: dict[str, tuple[str, int]] = {  # texture format -> numpy scalar, chann
     "depth32float": ("<f4", 1),
 }
 
-SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what it does
+SAMPLERS: dict[str, dict[str, str]] = {  # by the name of a module's binding
     "linear_clamp": {"mag_filter": "linear", "min_filter": "linear"},
     "linear_repeat": {
         "mag_filter": "linear",
@@ -88,44 +96,46 @@ SAMPLERS: dict[str, dict[str, str]] = {  # a module's sampler is named by what i
 }
 
 
-def check_size(nbytes: int, most_bytes: int, what: str) -> None:
-    """Raise InputError where a buffer is larger than the device takes."""
+def check_size(nbytes: int, most_bytes: int, purpose: str) -> None:
+    """Raise InputError where a buffer is larger than devices allow. `purpose` begins the message."""
     if nbytes > most_bytes:
         needed, most = -(-nbytes >> 20), most_bytes >> 20
         raise InputError(
-            f"{what} needs {needed} MiB in one buffer, more than the {most} MiB that devices take: the mesh is too"
+            f"{purpose} needs {needed} MiB in one buffer, more than the {most} MiB that devices allow: the mesh is too"
             " large, reduce it with --simplify"
         )
 
 
 def texel_bytes(texture_format: str) -> int:
-    """Bytes of one texel."""
+    """Return the bytes of one texel."""
     scalar, channels = FORMATS[texture_format]
     return np.dtype(scalar).itemsize * channels
 
 
 def adapters() -> list[Any]:
-    """The adapters of this machine, of those BACKENDS that the system has: Vulkan, on Macs Metal."""
+    """Return the adapters of this machine that have one of BACKENDS. The environment variable WGPUPY_WGPU_ADAPTER_NAME
+    limits them to those whose names contain it."""
     import wgpu
 
     _prepare_wgpu()
-    wanted = os.environ.get("WGPUPY_WGPU_ADAPTER_NAME", "")
+    part = os.environ.get("WGPUPY_WGPU_ADAPTER_NAME", "")
     return [
         a
         for a in wgpu.gpu.enumerate_adapters_sync()
-        if wanted in a.info["device"] and a.info["backend_type"] in BACKENDS.values()
+        if part in a.info["device"] and a.info["backend_type"] in BACKENDS.values()
     ]
 
 
 @lru_cache(maxsize=1)
 def _prepare_wgpu() -> None:
-    """Once, before anything is asked of wgpu."""
+    """Set up wgpu, once, before its first use."""
     from cffi import CDefError
     from wgpu.backends.wgpu_native import extras, ffi
 
-    extras.set_instance_extras(backends=list(BACKENDS))  # others are never used, and slow to ask
-    # Its calls have the C types that they need parsed one by one, 15 ms each and a second in all, since each time all
-    # names are declared anew. Parsed in one go they take as long as three. Without these internals it is only slower.
+    extras.set_instance_extras(backends=list(BACKENDS))  # others are never used, and slow to start
+    # wgpu parses the C types of its calls one by one, which takes 15 ms each and a second in all, since each time all
+    # names are declared again. Parsed in one go, all of them take as long as three. Without these internals wgpu works,
+    # but starts more slowly.
     with suppress(AttributeError, CDefError):
         names = [name.split()[1] for name in ffi._parser._declarations if name.startswith("typedef WGPU")]
         pointers = ffi.typeof(f"void(*)({', '.join(f'{name} *' for name in names)})").args
@@ -135,7 +145,7 @@ def _prepare_wgpu() -> None:
 
 @dataclass(frozen=True)
 class TextureKey:
-    """What makes two textures interchangeable in the pool."""
+    """The properties that two textures share if one can take the place of the other in the pool."""
 
     size: tuple[int, int, int]  # width, height, layers
     format: str
@@ -146,23 +156,25 @@ class TextureKey:
         return self.size[0] * self.size[1] * self.size[2] * texel_bytes(self.format)
 
 
+PoolKey: TypeAlias = TextureKey | tuple[int, int]
+"""Which resources of the pool are interchangeable: of buffers, size and usage."""
+
+
 class Gpu:
-    """A device with its pipelines, samplers and pool of textures.
+    """A device with its pipelines, samplers and pool of textures and buffers.
 
     Raises InputError where there is no adapter.
     """
 
     def __init__(self) -> None:
-        found = adapters()
-        if not found:
+        kinds = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown")  # best first
+        choice = sorted(adapters(), key=lambda a: kinds.index(a.info["adapter_type"]))
+        if not choice:
             raise InputError(INSTALL)
-        found.sort(
-            key=lambda a: ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "CPU", "Unknown").index(a.info["adapter_type"])
-        )
-        self.adapter = found[0]
+        self.adapter = choice[0]
         self.info = self.adapter.info
         self.is_cpu = self.info["adapter_type"] == "CPU"
-        # On lavapipe timestamps of compute passes are misattributed, so CPU adapters are timed by a fenced wall clock.
+        # On lavapipe timestamps of compute passes are misattributed: passes on CPU adapters are timed by a wall clock.
         self.has_timestamps = not self.is_cpu and "timestamp-query" in self.adapter.features
         self.device = self.adapter.request_device_sync(
             required_features=["timestamp-query"] if self.has_timestamps else [], required_limits=LIMITS
@@ -170,23 +182,22 @@ class Gpu:
         self.queue = self.device.queue
         self.most_bound = LIMITS["max-storage-buffer-binding-size"]
         self._shaders: dict[str, Any] = {}
-        self._pipelines: dict[Any, Any] = {}
+        self._pipelines: dict[Hashable, tuple[Any, list[Any]]] = {}
         self._samplers: dict[str, Any] = {}
-        self._views: dict[
-            int, dict[tuple[str, int | None], Any]
-        ] = {}  # by id of a pooled texture, which is never freed
-        self._free: defaultdict[Any, list[Any]] = defaultdict(list)
+        # By id of a texture that belongs to the pool, and so lives until `trim`.
+        self._views: dict[int, dict[tuple[str, int | None], Any]] = {}
+        self._free: defaultdict[PoolKey, list[Any]] = defaultdict(list)
         self._fence = self.buffer(np.zeros(1, np.uint32))
 
     @property
     def name(self) -> str:
-        """The adapter, in words."""
+        """The adapter's name and driver."""
         return f"{self.info['device']}, {self.info['description']}"
 
-    # what stays
+    # resources that persist
 
-    def texture(self, pixels: np.ndarray, texture_format: str) -> Any:
-        """A texture that holds `pixels` (height, width[, channels]) or (layers, height, width, channels)."""
+    def texture(self, pixels: npt.NDArray[Any], texture_format: str) -> Texture:
+        """Return a texture that holds `pixels` (height, width[, channels]) or (layers, height, width, channels)."""
         import wgpu
 
         scalar, channels = FORMATS[texture_format]
@@ -196,17 +207,17 @@ class Gpu:
         layers, height, width, got = data.shape
         largest = LIMITS["max-texture-dimension-2d"]
         if max(width, height) > largest:
-            raise InputError(f"a texture of {width} x {height} texels is larger than the {largest} that devices take")
+            raise InputError(f"a texture of {width} x {height} texels is larger than the {largest} that devices allow")
         if got != channels:
-            raise ValueError(f"{texture_format} wants {channels} channels, got {got}")
+            raise ValueError(f"{texture_format} has {channels} channels, got {got}")
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST | wgpu.TextureUsage.COPY_SRC
         texture = self.device.create_texture(size=(width, height, layers), format=texture_format, usage=usage)
         layout = {"bytes_per_row": width * texel_bytes(texture_format), "rows_per_image": height}
         self.queue.write_texture({"texture": texture}, data, layout, (width, height, layers))
         return texture
 
-    def buffer(self, data: np.ndarray | bytes) -> Any:
-        """A buffer that holds `data`, to be bound as storage or used as an index buffer."""
+    def buffer(self, data: npt.NDArray[Any] | bytes) -> Buffer:
+        """Return a buffer that holds `data`, to be bound as storage or used as an index buffer."""
         import wgpu
 
         usage = (
@@ -218,8 +229,8 @@ class Gpu:
         return self.device.create_buffer_with_data(data=raw + bytes(-len(raw) % 4), usage=usage)
 
     @cached_property
-    def no_depth(self) -> Any:
-        """A depth texture of one texel, to bind where there is none."""
+    def no_depth(self) -> Texture:
+        """A depth texture of one texel, to bind where a module has a depth texture and there is none."""
         import wgpu
 
         return self.device.create_texture(
@@ -227,12 +238,12 @@ class Gpu:
         )
 
     @cached_property
-    def black(self) -> Any:
-        """A black texture of one texel, to bind where there is none."""
+    def black(self) -> Texture:
+        """A black texture of one texel, to bind where a module has a texture and there is none."""
         return self.texture(np.zeros((1, 1, 4)), "rgba16float")
 
-    def read_texture(self, texture: Any) -> np.ndarray:
-        """The texels of a texture: (height, width, channels), with a leading axis of layers where there are several."""
+    def read_texture(self, texture: Texture) -> npt.NDArray[Any]:
+        """Return the texels of a texture, (height, width, channels) or (layers, height, width, channels)."""
         scalar, channels = FORMATS[texture.format]
         width, height, layers = texture.size
         row = width * texel_bytes(texture.format)
@@ -257,9 +268,10 @@ class Gpu:
 
         return float(lib.wgpuQueueGetTimestampPeriod(self.queue._internal))
 
-    # what passes need again and again
+    # samplers, shaders and pipelines
 
     def sampler(self, name: str) -> Any:
+        """Return the sampler of SAMPLERS with this name."""
         if name not in self._samplers:
             if name not in SAMPLERS:
                 raise wgsl.WgslError(f"no sampler is called '{name}' (known: {', '.join(SAMPLERS)})")
@@ -267,7 +279,7 @@ class Gpu:
         return self._samplers[name]
 
     def shader(self, module: wgsl.Module) -> Any:
-        """The compiled module. Raises WgslError with the place in the file that is wrong."""
+        """Return the compiled module. Raises WgslError, with file and line, where it does not compile."""
         import wgpu
 
         if module.source not in self._shaders:
@@ -277,43 +289,46 @@ class Gpu:
                 raise wgsl.WgslError(module.explain(str(error))) from None
         return self._shaders[module.source]
 
-    def pipeline(self, key: Any, make: Any) -> Any:
-        """The pipeline of complete state `key`, made by `make()` the first time, with its bind group layout."""
+    def pipeline(self, key: Hashable, make: Callable[[], Any], groups: int) -> tuple[Any, list[Any]]:
+        """Return the pipeline of complete state `key`, which `make()` creates the first time, and the layouts of its
+        bind groups."""
         if key not in self._pipelines:
             pipeline = make()
-            self._pipelines[key] = (pipeline, pipeline.get_bind_group_layout(0))
+            self._pipelines[key] = pipeline, [pipeline.get_bind_group_layout(i) for i in range(groups)]
         return self._pipelines[key]
 
-    def view(self, texture: Any, dimension: str = "2d", layer: int | None = None) -> Any:
-        """A view of a whole texture or of one layer; of a pooled texture, which comes back each frame, made once."""
+    def view(self, texture: Texture, dimension: str = "2d", layer: int | None = None) -> Any:
+        """Return a view of a texture or of one layer. Views of a texture of the pool are created once."""
         views = self._views.get(id(texture), {})
         if (dimension, layer) not in views:
             layers = {} if layer is None else {"base_array_layer": layer, "array_layer_count": 1}
             views[dimension, layer] = texture.create_view(dimension=dimension, **layers)
         return views[dimension, layer]
 
-    def acquire(self, key: TextureKey) -> Any:
-        """A texture from the pool. Its content is undefined."""
+    # the pool
+
+    def acquire(self, key: TextureKey) -> Texture:
+        """Return a texture from the pool, with undefined content."""
         if self._free[key]:
             return self._free[key].pop()
         texture = self.device.create_texture(size=key.size, format=key.format, usage=key.usage)
         self._views[id(texture)] = {}
         return texture
 
-    def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Any, Any]:
-        """A buffer of at least `nbytes` from the pool, and the key to give it back with."""
+    def acquire_buffer(self, nbytes: int, usage: int) -> tuple[Buffer, PoolKey]:
+        """Return a buffer of at least `nbytes` from the pool, with undefined content, and its key for `release`."""
         check_size(nbytes, LIMITS["max-buffer-size"], "a pass")
         key = (1 << max(nbytes - 1, 255).bit_length(), usage)
         if self._free[key]:
             return self._free[key].pop(), key
         return self.device.create_buffer(size=key[0], usage=usage), key
 
-    def release(self, key: Any, resource: Any) -> None:
+    def release(self, key: PoolKey, resource: Buffer | Texture) -> None:
         """Give a texture or buffer back to the pool."""
         self._free[key].append(resource)
 
     def trim(self) -> None:
-        """Let go of what is in the pool, where sizes are not those of before."""
+        """Drop the textures and buffers in the pool, for frames of another size to need none of them."""
         for resources in self._free.values():
             for resource in resources:
                 self._views.pop(id(resource), None)
@@ -322,5 +337,5 @@ class Gpu:
 
 @lru_cache(maxsize=1)
 def default_gpu() -> Gpu:
-    """The device that the commands share."""
+    """Return the device that all renderers share by default."""
     return Gpu()

@@ -1,36 +1,55 @@
-"""The render graph: declare passes, cull back from what is wanted, pool, run, time.
+"""The render graph: declare passes, run those that are needed, reuse textures and buffers, measure times.
 
-A pass is a WGSL module called by the names of its bindings; what it gives back are handles to what it writes:
+A pass is a WGSL module called with a value for each of its bindings, by name; it returns handles to its outputs:
 
-    blurred = graph.draw("texture_space/blur", source=irradiance, stretch=stretch, params=dict(sigma=0.7, axis=0))
+    blurred = graph.draw("texture_space/blur", source=irradiance, params={"variance": 0.7, "direction": 0}, ...)
 
-Declaration order is execution order. A graph is built for one frame and dropped; nothing is allocated until `run`.
+Passes run in the order of their declaration. A graph is built for one frame and dropped; nothing is allocated before
+`run`.
 """
 
 from __future__ import annotations
 
 import difflib
 import weakref
-from collections.abc import Mapping
-from types import SimpleNamespace
-from typing import Any, Literal
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from typing import Any, Literal, ParamSpec
 
 import numpy as np
+import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.gpu import Gpu, TextureKey, check_size
-from wgsss.passes import Dispatch, Draw, Encoder, Handle, Pass, Resource, pipeline, view_dimension
+from wgsss.encoder import Encoder
+from wgsss.gpu import Buffer, Gpu, TextureKey
+from wgsss.passes import Bindings, Dispatch, Draw, Handle, Outputs, Pass, Resource, Size, Value
+from wgsss.pipelines import Uploads, bind
 from wgsss.wgsl import Binding, Module, WgslError
 
-Size = int | tuple[int, int] | tuple[int, int, int]
-_UPLOAD_ALIGNMENT = 256  # the largest minimum that WebGPU allows for offsets of uniform and storage bindings
+_P = ParamSpec("_P")
+
+
+def _single(declare: Callable[_P, Outputs]) -> Callable[_P, Handle]:
+    """Return the same method for modules with one output: it returns that output's handle."""
+
+    @wraps(declare)
+    def declare_single(*args: _P.args, **kwargs: _P.kwargs) -> Handle:
+        outputs = declare(*args, **kwargs)
+        if len(outputs) > 1:
+            raise WgslError(f"{args[1]} has the outputs {', '.join(outputs)}: use {declare.__name__}")
+        return next(iter(outputs.values()))
+
+    return declare_single
 
 
 class Graph:
     """The passes of one frame.
 
-    After `run`: `times` (pass name -> ms, where timed), `clock` ("gpu timestamps" or "fenced wall clock"), `ran` and
-    `culled` (passes), `peak_bytes` (most transient bytes live at once). `str(graph)` is the table of all that.
+    Attributes:
+        times: ms of each pass by name, after a timed `run`.
+        clock: how they are measured, "gpu timestamps" or "fenced wall clock".
+        ran, culled: the passes that the last `run` ran, and those that it did not need.
+        peak_bytes: the most bytes of transient resources that the last `run` held at once.
     """
 
     def __init__(self, gpu: Gpu) -> None:
@@ -43,66 +62,73 @@ class Graph:
         self.peak_bytes = 0
         self.uploaded_bytes = 0
         self._names: dict[str, int] = {}
-        self._held: list[Resource] = []  # what is left of it goes back to the pool with the graph
-        weakref.finalize(self, _release, gpu, self._held).atexit = False
+        self._allocated: list[Resource] = []  # those of them that the graph still holds go back to the pool with it
+        weakref.finalize(self, _release, gpu, self._allocated).atexit = False
 
     # declaring
 
     def texture(self, name: str, size: tuple[int, int, int], texture_format: str) -> Handle:
-        """A texture (width, height, layers) that several passes will write in turn, by `into` or `depth_buffer`."""
+        """Return a texture (width, height, layers) that several passes write in turn, as `into` or `depth_buffer`."""
         return Handle(Resource(name, texture_format, size), 0)
 
-    def draw(
+    def draw_outputs(
         self,
         module: str,
         *,
         size: tuple[int, int] | None = None,
-        indices: Any = None,
+        indices: Buffer | None = None,
         count: int = 3,
         into: Handle | Mapping[str, Handle] | None = None,
         depth_buffer: Handle | Literal["new"] | None = None,
         layer: int = 0,
         constants: Mapping[str, float] | None = None,
         label: str = "",
-        **bindings: Any,
-    ) -> Any:
-        """Declare a raster pass of `wgsl/<module>.wgsl`; without `indices` (a u32 index buffer) a full-screen triangle.
+        **bindings: Value,
+    ) -> Outputs:
+        """Declare a raster pass of `wgsl/<module>.wgsl`. Without `indices` and `count` it draws one triangle.
 
         Args:
-            size: of the targets made, in texels; by default that of `into`, `depth_buffer` or the first texture bound.
-            into: targets to draw onto instead of new, cleared ones (a handle, or handles by output name).
+            size: of the targets that it creates, in texels; by default that of `into`, of `depth_buffer` or of the
+                first texture bound.
+            indices: index buffer, u32.
+            count: number of vertices, where there are no indices.
+            into: targets to draw onto instead of new, cleared ones: one handle, or handles by output name.
             depth_buffer: "new" for a cleared depth buffer, or one to test against and write.
-            layer: of array textures given as `into` or `depth_buffer`.
-            bindings: the module's bindings by name: handles, GPU resources that persist, or values to pack and upload.
+            layer: layer of the array textures among `into` and `depth_buffer`.
+            constants: values of the module's `override` constants.
+            label: what distinguishes this pass from others of the module, in names of passes.
+            bindings: values of the module's bindings by name: handles, GPU resources that persist, or numbers.
 
         Returns:
-            The handle written; where there are several, a namespace by output name, `depth` among them.
+            The handles written, by output name; that of the depth buffer is `depth`.
 
         Raises:
-            WgslError: for a missing, unknown or ill-typed name, listing what the module wants and what it was given.
+            WgslError: for a binding that is missing, unknown or of the wrong type.
         """
         loaded = wgsl.load(module)
         item = self._declare(loaded, label, constants, bindings)
-        given = (
-            dict(into) if isinstance(into, Mapping) else {t[0]: into for t in loaded.targets[:1] if into is not None}
-        )
+        targets: dict[str, Handle] = {}
+        if isinstance(into, Handle):
+            targets = {name: into for name, _ in loaded.targets[:1]}
+        elif into is not None:
+            targets = dict(into)
         if size is None:
-            size = self._default_size([*given.values(), depth_buffer, *item.reads.values()], loaded)
-        targets = []
+            size = _first_size([*targets.values(), depth_buffer, *item.reads.values()], loaded)
+        is_kept = []
         for name, texture_format in loaded.targets:
-            if name in given:
-                self._write_on(item, name, given[name])
+            if name in targets:
+                self._write_on(item, name, targets[name])
             else:
                 self._write_new(item, name, Resource(f"{item.name}.{name}", texture_format, (*size, 1)))
-            targets.append((name, item.writes[name].layer(layer) in item.writes[name].resource.drawn))
+            is_kept.append((name, item.writes[name].layer(layer) in item.writes[name].resource.drawn))
         if depth_buffer == "new":
             self._write_new(item, "depth", Resource(f"{item.name}.depth", "depth32float", (*size, 1)))
         elif isinstance(depth_buffer, Handle):
             self._write_on(item, "depth", depth_buffer)
         if not item.writes:
-            raise WgslError(f"{item.name}: draws nothing: it has neither targets nor a depth buffer")
-        written = item.writes.get("depth")
-        keep_depth = written is not None and written.layer(layer) in written.resource.drawn
+            raise WgslError(f"{item.name}: has neither targets nor a depth buffer to draw onto")
+        depth = item.writes.get("depth")
+        keep_depth = depth is not None and depth.layer(layer) in depth.resource.drawn
         import wgpu
 
         for handle in item.writes.values():
@@ -110,33 +136,29 @@ class Graph:
             handle.resource.drawn.add(handle.layer(layer))
         if indices is not None and count == 3:
             count = indices.size // 4
-        item.state = Draw(tuple(targets), keep_depth, layer, indices, count)
-        return self._outputs(item)
+        item.state = Draw(tuple(is_kept), keep_depth, layer, indices, count)
+        return Outputs(item.writes)
 
-    def dispatch(
+    def dispatch_outputs(
         self,
         module: str,
         *,
         size: Size | None = None,
         constants: Mapping[str, float] | None = None,
         label: str = "",
-        **bindings: Any,
-    ) -> Any:
+        **bindings: Value,
+    ) -> Outputs:
         """Declare a compute pass of `wgsl/<module>.wgsl` over `size` (items, or width, height[, layers]).
 
-        Storage that the module writes and that is not among `bindings` is made with `size`; a handle given for it is
-        written in place. Returns and raises as `draw`.
+        Storage that the module writes is created with that size, unless `bindings` has a handle for it, which is then
+        written in place. Returns and raises as `draw_outputs`.
         """
         loaded = wgsl.load(module)
-        written = {
-            n: b for n, b in loaded.bindings.items() if b.access in ("write", "read_write") and b.space != "sampler"
-        }
-        item = self._declare(loaded, label, constants, bindings, made=frozenset(written) - set(bindings))
+        written = {n: b for n, b in loaded.used.items() if b.access in ("write", "read_write") and b.space != "sampler"}
+        item = self._declare(loaded, label, constants, bindings, created=frozenset(written) - set(bindings))
         if size is None:
-            size = self._default_size(
-                [bindings[n] for n in written if isinstance(bindings.get(n), Handle)] or list(item.reads.values()),
-                loaded,
-            )
+            bound = [bindings[name] for name in written if name in bindings]
+            size = _first_size([*bound, *item.reads.values()], loaded)
         extent = (size, 1, 1) if isinstance(size, int) else (*size, 1)[:3]
         for name, binding in written.items():
             handle = item.reads.get(name)
@@ -150,32 +172,40 @@ class Graph:
                 self._write_new(item, name, resource)
         groups = [-(-n // w) for n, w in zip(extent, loaded.workgroup_size(constants or {}), strict=True)]
         item.state = Dispatch((groups[0], groups[1], groups[2]))
-        return self._outputs(item)
+        return Outputs(item.writes)
+
+    draw = _single(draw_outputs)
+    dispatch = _single(dispatch_outputs)
 
     def _declare(
-        self, module: Module, label: str, constants: Any, bindings: dict[str, Any], made: frozenset[str] = frozenset()
+        self,
+        module: Module,
+        label: str,
+        constants: Mapping[str, float] | None,
+        bindings: Mapping[str, Value],
+        created: frozenset[str] = frozenset(),
     ) -> Pass:
         name = f"{module.name} {label}".strip()
         self._names[name] = self._names.get(name, 0) + 1
         item = Pass(name if self._names[name] == 1 else f"{name} #{self._names[name]}", module, dict(constants or {}))
-        wanted = {n: b for n, b in module.bindings.items() if b.space != "sampler" and n not in made}
-        if set(bindings) != set(wanted):
-            raise WgslError(_mismatch(module, wanted, bindings))
+        expected = {n: b for n, b in module.used.items() if b.space != "sampler" and n not in created}
+        if set(bindings) != set(expected):
+            raise WgslError(_mismatch(module, expected, bindings))
         unknown = set(item.constants) - set(module.overrides)
         if unknown:
             known = ", ".join(module.overrides)
             raise WgslError(f"{module.name}: no override is called {', '.join(sorted(unknown))} (known: {known})")
         for key, value in bindings.items():
-            self._bind(item, wanted[key], value)
+            self._bind(item, expected[key], value)
         self.passes.append(item)
         return item
 
-    def _bind(self, item: Pass, binding: Binding, value: Any) -> None:
+    def _bind(self, item: Pass, binding: Binding, value: Value) -> None:
         import wgpu
 
-        wants_texture = binding.space in ("texture", "storage_texture")
+        takes_texture = binding.space in ("texture", "storage_texture")
         if isinstance(value, Handle):
-            if wants_texture == (value.resource.layout is not None):
+            if takes_texture == (value.resource.layout is not None):
                 raise WgslError(f"{item.module.name}: '{binding.name}' is a {binding.type}, got {value!r}")
             if value.version == 0 and binding.access == "read":
                 raise WgslError(f"{item.module.name}: '{binding.name}' is {value!r}, which no pass has written")
@@ -183,74 +213,60 @@ class Graph:
                 "texture": wgpu.TextureUsage.TEXTURE_BINDING,
                 "storage_texture": wgpu.TextureUsage.STORAGE_BINDING,
             }.get(binding.space, wgpu.BufferUsage.STORAGE)
-            item.reads[binding.name] = self._checked(value)
-        elif isinstance(value, wgpu.GPUTexture if wants_texture else wgpu.GPUBuffer):
+            item.reads[binding.name] = _current(value)
+        elif isinstance(value, wgpu.GPUTexture if takes_texture else wgpu.GPUBuffer):
             item.imports[binding.name] = value
-        elif not wants_texture and not isinstance(value, wgpu.GPUTexture):
+        elif not takes_texture and not isinstance(value, wgpu.GPUTexture):
             item.uploads[binding.name] = item.module.layout(binding.type).pack(value)
         else:
             raise WgslError(f"{item.module.name}: '{binding.name}' is a {binding.type}, got {type(value).__name__}")
-
-    def _checked(self, handle: Handle) -> Handle:
-        if handle.version != handle.resource.version:
-            raise WgslError(f"{handle!r} is stale: a later pass wrote {handle.resource.name}@{handle.resource.version}")
-        return handle
-
-    def _default_size(self, handles: list[Any], module: Module) -> tuple[int, int]:
-        for handle in handles:
-            if isinstance(handle, Handle) and handle.format:
-                return handle.size
-        raise WgslError(f"{module.name}: give a size, since no texture says it")
 
     def _write_new(self, item: Pass, name: str, resource: Resource) -> None:
         import wgpu
 
         resource.version = 1
         resource.usage |= wgpu.BufferUsage.STORAGE if resource.layout else 0
-        if resource.format and name in item.module.bindings:
+        if resource.format and name in item.module.used:
             resource.usage |= wgpu.TextureUsage.STORAGE_BINDING
         item.writes[name] = Handle(resource, 1)
 
     def _write_on(self, item: Pass, name: str, handle: Handle) -> None:
-        if self._checked(handle).version:
+        if _current(handle).version:
             item.reads.setdefault(name, handle)
         handle.resource.version += 1
         item.writes[name] = Handle(handle.resource, handle.version + 1)
 
-    @staticmethod
-    def _outputs(item: Pass) -> Any:
-        return next(iter(item.writes.values())) if len(item.writes) == 1 else SimpleNamespace(**item.writes)
-
     # running
 
-    def needed(self, *wanted: Handle) -> list[Pass]:
-        """The passes without which these handles would not be written, in declaration order."""
-        read = set(wanted)
-        kept: list[Pass] = []
+    def needed(self, *outputs: Handle) -> list[Pass]:
+        """Return the passes without which these handles would not be written, in the order of declaration."""
+        read = set(outputs)
+        needed: list[Pass] = []
         for item in reversed(self.passes):
             if read & set(item.writes.values()):
-                kept.append(item)
+                needed.append(item)
                 read |= set(item.reads.values())
-        return kept[::-1]
+        return needed[::-1]
 
-    def run(self, *wanted: Handle, timed: bool = False) -> None:
-        """Run what the wanted handles need, in declaration order.
+    def run(self, *outputs: Handle, timed: bool = False) -> None:
+        """Run the passes that these outputs need, in the order of declaration; `read` then reads the outputs.
 
-        With `timed`, `times` is filled: from timestamps on hardware; on CPU adapters each pass is submitted alone
-        and fenced.
+        With `timed`, fill `times`: from timestamps on hardware; on CPU adapters by submitting and fencing each pass
+        alone.
         """
         import wgpu
 
-        shown = wgpu.TextureUsage.COPY_SRC | wgpu.TextureUsage.TEXTURE_BINDING
-        for handle in wanted:
-            handle.resource.usage |= shown if handle.format else wgpu.BufferUsage.COPY_SRC
-        self.ran = self.needed(*wanted)
+        readable = wgpu.TextureUsage.COPY_SRC | wgpu.TextureUsage.TEXTURE_BINDING
+        for handle in outputs:
+            handle.resource.usage |= readable if handle.format else wgpu.BufferUsage.COPY_SRC
+        self.ran = self.needed(*outputs)
         chosen = set(self.ran)
         self.culled = [p for p in self.passes if p not in chosen]
-        keep = {h.resource for h in wanted}
+        keep = {h.resource for h in outputs}
         last_use = {h.resource: i for i, p in enumerate(self.ran) for h in (*p.reads.values(), *p.writes.values())}
 
-        arena, arena_key, offsets = self._upload()
+        uploads = Uploads(self.gpu, self.ran)
+        self.uploaded_bytes = uploads.nbytes
         live = 0
         self.peak_bytes = 0
         encoder = Encoder(self.gpu, self.ran, timed)
@@ -261,29 +277,28 @@ class Graph:
                     live += handle.resource.nbytes
             self.peak_bytes = max(self.peak_bytes, live)
             try:
-                bound = self._bind_group(item, arena, offsets)
+                pipeline, groups = bind(self.gpu, item, uploads)
             except wgpu.GPUValidationError as error:
                 raise WgslError(f"{item.name}: {item.module.explain(str(error))}") from None
-            encoder.encode(i, item, bound)
+            encoder.encode(i, item, pipeline, groups)
             for handle in {*item.reads.values(), *item.writes.values()}:
                 resource = handle.resource
                 if last_use[resource] == i and resource.gpu is not None and resource not in keep:
-                    self.gpu.release(resource.key, resource.gpu)
-                    resource.gpu = None
+                    _release(self.gpu, [resource])
                     live -= resource.nbytes
         encoder.finish()
         self.times = encoder.times
-        if arena is not None:
-            self.gpu.release(arena_key, arena)
+        uploads.release()
 
-    def read(self, handle: Handle) -> np.ndarray:
-        """What a wanted handle holds after `run`: texels (height, width, channels), or a buffer's elements."""
-        if handle.resource.gpu is None:
+    def read(self, handle: Handle) -> npt.NDArray[Any]:
+        """Return what an output holds after `run`: texels (height, width, channels), or the elements of a buffer."""
+        resource = handle.resource
+        if resource.gpu is None:
             raise WgslError(f"{handle!r} was not among the handles that run() was asked for")
-        if handle.resource.layout is None:
-            return self.gpu.read_texture(handle.resource.gpu)
-        raw = self.gpu.queue.read_buffer(handle.resource.gpu, 0, handle.resource.nbytes)
-        return np.frombuffer(raw, handle.resource.layout.dtype)
+        if resource.layout is None:
+            return self.gpu.read_texture(resource.gpu)
+        raw = self.gpu.queue.read_buffer(resource.gpu, 0, resource.nbytes)
+        return np.frombuffer(raw, resource.layout.dtype)
 
     def _allocate(self, resource: Resource) -> None:
         import wgpu
@@ -292,54 +307,11 @@ class Graph:
             usage = resource.usage | wgpu.BufferUsage.COPY_DST
             resource.gpu, resource.key = self.gpu.acquire_buffer(resource.nbytes, usage)
         else:
-            resource.key = TextureKey(resource.size, resource.format, resource.usage)
-            resource.gpu = self.gpu.acquire(resource.key)
-        self._held.append(resource)
+            key = TextureKey(resource.size, resource.format, resource.usage)
+            resource.gpu, resource.key = self.gpu.acquire(key), key
+        self._allocated.append(resource)
 
-    def _upload(self) -> tuple[Any, Any, dict[tuple[Pass, str], int]]:
-        """One buffer with all values that the kept passes were given, and the offset of each."""
-        import wgpu
-
-        offsets: dict[tuple[Pass, str], int] = {}
-        seen: dict[bytes, int] = {}
-        chunks, end = [], 0
-        for item in self.ran:
-            for name, data in item.uploads.items():
-                if data not in seen:
-                    seen[data] = end
-                    chunks.append(data + bytes(-len(data) % _UPLOAD_ALIGNMENT))
-                    end += len(chunks[-1])
-                offsets[item, name] = seen[data]
-        if not chunks:
-            return None, None, offsets
-        usage = wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST
-        arena, key = self.gpu.acquire_buffer(end, usage)
-        self.gpu.queue.write_buffer(arena, 0, b"".join(chunks))
-        self.uploaded_bytes = end
-        return arena, key, offsets
-
-    def _bind_group(self, item: Pass, arena: Any, offsets: Mapping[tuple[Pass, str], int]) -> tuple[Any, Any]:
-        state, layout = self.gpu.pipeline(*pipeline(self.gpu, item))
-        entries = []
-        for name, binding in item.module.bindings.items():
-            resource: Any
-            if binding.space == "sampler":
-                resource = self.gpu.sampler(name)
-            elif name in item.uploads:
-                resource = {"buffer": arena, "offset": offsets[item, name], "size": len(item.uploads[name])}
-            else:
-                handle = item.reads.get(name) or item.writes.get(name)
-                resource = handle.resource.gpu if handle else item.imports[name]
-                if binding.space in ("texture", "storage_texture"):
-                    resource = self.gpu.view(resource, view_dimension(binding.type))
-                elif handle:
-                    resource = {"buffer": resource, "offset": 0, "size": handle.resource.nbytes}
-                if binding.space == "storage":
-                    size = handle.resource.nbytes if handle else resource.size
-                    check_size(size, self.gpu.most_bound, f"{item.name}: {name}")
-            entries.append({"binding": binding.number, "resource": resource})
-        group = self.gpu.device.create_bind_group(layout=layout, entries=entries) if entries else None
-        return state, group
+    # describing
 
     def __str__(self) -> str:
         rows = [("pass", "reads", "writes", "ms")]
@@ -361,7 +333,7 @@ class Graph:
         return "\n".join(lines)
 
     def dot(self) -> str:
-        """The graph for Graphviz: passes are boxes, grey where culled; edges carry the resource."""
+        """Return the graph for Graphviz: passes are boxes, grey where culled, and edges the resources between them."""
         lines = ["digraph frame {", "  rankdir=LR; node [shape=box, fontname=sans];"]
         writer = {handle: item.name for item in self.passes for handle in item.writes.values()}
         for item in self.passes:
@@ -372,21 +344,38 @@ class Graph:
         return "\n".join([*lines, "}"]) + "\n"
 
 
+def _current(handle: Handle) -> Handle:
+    """Return the handle; raise WgslError where a later pass has written its resource."""
+    if handle.version != handle.resource.version:
+        raise WgslError(f"{handle!r} is stale: a later pass wrote {handle.resource.name}@{handle.resource.version}")
+    return handle
+
+
+def _first_size(values: Iterable[Any], module: Module) -> tuple[int, int]:
+    """Return the size of the first texture among these values."""
+    for value in values:
+        if isinstance(value, Handle) and value.format:
+            return value.size
+    raise WgslError(f"{module.name}: give a size, since no texture among the bindings has one")
+
+
 def _release(gpu: Gpu, resources: list[Resource]) -> None:
     for resource in resources:
-        if resource.gpu is not None:
+        if resource.gpu is not None and resource.key is not None:
             gpu.release(resource.key, resource.gpu)
+            resource.gpu = None
 
 
-def _mismatch(module: Module, wanted: Mapping[str, Binding], given: Mapping[str, Any]) -> str:
-    parts = [f"{module.name} wants {', '.join(f'{n}: {b.type}' for n, b in wanted.items()) or 'nothing'}"]
-    parts.append(f"was given {', '.join(given) or 'nothing'}")
-    if missing := [n for n in wanted if n not in given]:
+def _mismatch(module: Module, expected: Mapping[str, Binding], bindings: Mapping[str, Value]) -> str:
+    parts = [f"{module.name} has the bindings {', '.join(f'{n}: {b.type}' for n, b in expected.items()) or 'none'}"]
+    parts.append(f"got {', '.join(bindings) or 'none'}")
+    if missing := [n for n in expected if n not in bindings]:
         parts.append(f"missing: {', '.join(missing)}")
-    for name in (n for n in given if n not in wanted):
-        near = difflib.get_close_matches(name, list(wanted), n=1)
-        parts.append(f"unknown: {name}" + (f" (did you mean '{near[0]}'?)" if near else ""))
+    for name in (n for n in bindings if n not in expected):
+        near = difflib.get_close_matches(name, list(expected), n=1)
+        hint = f" (did you mean '{near[0]}'?)" if near else ""
+        parts.append(f"unknown: {name}" + (" (no entry point uses it)" if name in module.bindings else hint))
     return "; ".join(parts)
 
 
-__all__ = ["Graph", "Handle", "Pass", "Resource"]
+__all__ = ["Bindings", "Graph", "Handle", "Outputs", "Pass", "Resource", "Value"]

@@ -1,14 +1,21 @@
-"""WGSL as the only declaration: imports, bindings and host-shareable layouts read from the text of a module.
+"""Read WGSL modules: resolve their imports, and find the bindings, outputs and memory layouts that they declare.
 
-Imports follow the smallest subset of WESL: `import package::fresnel::{schlick};` includes the whole file
-`wgsl/fresnel.wgsl` once, before the text that asked for it, and checks that the names exist there. Render targets
-carry their format as an alias of the output's type (`@location(0) M_front: RGBA16Float`, see `wgsl/targets.wgsl`).
+The WGSL text is the only declaration of these; Python repeats none of them.
+
+Imports follow a small subset of WESL: `import package::fresnel::{schlick};` includes the whole file
+`wgsl/fresnel.wgsl` once, before the text of the importing module, and checks that the file declares these names.
+
+Group 0 holds the bindings of the module that is compiled. Files that other modules import may own bindings too, in
+group 1 (`wgsl/lights.wgsl`, `wgsl/per_object.wgsl`). A pass binds only those that its entry points use, since that is
+all that a pipeline with an automatic layout has.
+
+A render target's format is the type of the output, an alias (`@location(0) M_front: RGBA16Float`, `wgsl/targets.wgsl`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +37,11 @@ _ALIAS = re.compile(r"\balias\s+(\w+)\s*=\s*([^;]+);")
 _CONST = re.compile(r"\bconst\s+(\w+)\s*(?::\s*\w+\s*)?=\s*(\d+)[ui]?\s*;")
 _OVERRIDE = re.compile(r"\boverride\s+(\w+)\s*(?::\s*\w+\s*)?(?:=\s*([^;]+))?;")
 _ENTRY = re.compile(r"@(vertex|fragment|compute)\b([^{;]*?)\bfn\s+(\w+)\s*\(")
+_FUNCTION = re.compile(r"\bfn\s+(\w+)\s*\(")
+_PARAMETER = re.compile(r"(\w+)\s*:")
+_CALL = re.compile(r"(?<![.\w])([A-Za-z_]\w*)\s*\(")
+_LOCAL = re.compile(r"\b(?:let|var|const)\s+(\w+)")
+_NAME = re.compile(r"(?<![.\w])[A-Za-z_]\w*")
 _WORKGROUP = re.compile(r"@workgroup_size\(([^)]*)\)")
 _RETURNS = re.compile(r"@fragment\s+fn\s+\w+\s*\([^{]*?->\s*(\w+)\s*\{", re.S)
 _SCALARS = {"f32": "<f4", "i32": "<i4", "u32": "<u4", "f16": "<f2"}
@@ -221,6 +233,38 @@ class Module:
         return found
 
     @cached_property
+    def _references(self) -> dict[str, set[str]]:
+        """By function, the names of module scope that its body mentions."""
+        return {
+            name: set(_NAME.findall(body)) - set(_PARAMETER.findall(parameters)) - set(_LOCAL.findall(body))
+            | set(_CALL.findall(body))
+            for name, parameters, body in _functions(self._clean)
+        }
+
+    @cached_property
+    def used(self) -> dict[str, Binding]:
+        """The bindings that a pass of this module binds: those that its entry points use, themselves or in functions
+        that they call. A module with a compute entry point is a compute pass.
+
+        Raises WgslError where two of them share a number, as bindings of two imported files may.
+        """
+        stages = ("compute",) if "compute" in self.stages else ("vertex", "fragment")
+        reached: set[str] = set()
+        pending = [self.stages[stage] for stage in stages if stage in self.stages]
+        while pending:
+            if (name := pending.pop()) not in reached:
+                reached.add(name)
+                pending += self._references.get(name, ())
+        used = {name: binding for name, binding in self.bindings.items() if name in reached}
+        by_number: dict[tuple[int, int], str] = {}
+        for name, binding in used.items():
+            other = by_number.setdefault((binding.group, binding.number), name)
+            if other != name:
+                place = f"@group({binding.group}) @binding({binding.number})"
+                raise WgslError(f"{self.name}: {other} and {name} are both {place}")
+        return used
+
+    @cached_property
     def targets(self) -> tuple[tuple[str, str], ...]:
         """The fragment output: (field name, texture format) by location; the format is the field's type, an alias."""
         match = _RETURNS.search(self._clean)
@@ -313,6 +357,24 @@ def _padded(layout: Layout, stride: int) -> np.dtype:
     if layout.dtype.itemsize == stride:
         return layout.dtype
     return np.dtype({"names": ["value"], "formats": [layout.dtype], "offsets": [0], "itemsize": stride})
+
+
+def _functions(clean: str) -> Iterator[tuple[str, str, str]]:
+    """Yield name, parameters and body of each function in a text without comments."""
+    for match in _FUNCTION.finditer(clean):
+        opened = _closing(clean, match.end() - 1, "()")
+        body = clean.index("{", opened)
+        yield match.group(1), clean[match.end() : opened], clean[body : _closing(clean, body, "{}")]
+
+
+def _closing(clean: str, start: int, brackets: str) -> int:
+    """Return the index of the bracket that closes the one at `start`."""
+    depth = 0
+    for match in re.compile(f"[{re.escape(brackets)}]").finditer(clean, start):
+        depth += 1 if match.group() == brackets[0] else -1
+        if depth == 0:
+            return match.start()
+    return len(clean)
 
 
 def _resolve(

@@ -2,8 +2,7 @@
 
 import package::units::{Number};
 import package::mesh::{Vertex, ObjectUniforms, bent_normal, color_before, map_coordinates};
-import package::light::{Light, ShadowView, incident, shadow, layer_towards};
-import package::irradiance::{transmitted, transmitted_environment};
+import package::lights::{transmitted_irradiance};
 import package::screen::{direction_to_eye};
 import package::targets::{RGBA16Float};
 
@@ -15,21 +14,14 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> object: ObjectUniforms;
 @group(0) @binding(1) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(2) var<storage, read> lights: array<Light>;
-@group(0) @binding(3) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(4) var shadow_maps: texture_depth_2d_array;
-@group(0) @binding(5) var compare_less: sampler_comparison;
-@group(0) @binding(6) var rho_dt_table: texture_2d<f32>;
-@group(0) @binding(7) var environment: texture_2d<f32>;
-@group(0) @binding(8) var linear_wrap_u: sampler;
-@group(0) @binding(9) var base_color_map: texture_2d<f32>;
-@group(0) @binding(10) var normal_map: texture_2d<f32>;
-@group(0) @binding(11) var specular_map: texture_2d<f32>;
-@group(0) @binding(12) var linear_repeat: sampler;
-@group(0) @binding(13) var<uniform> params: Params;
+@group(0) @binding(2) var base_color_map: texture_2d<f32>;
+@group(0) @binding(3) var normal_map: texture_2d<f32>;
+@group(0) @binding(4) var specular_map: texture_2d<f32>;
+@group(0) @binding(5) var linear_repeat: sampler;
+@group(0) @binding(6) var<uniform> params: Params;
 // Of the angle between normal and viewer, from which on texels are lit: at each vertex, or one for all.
-@group(0) @binding(14) var<storage, read> least_cosines: array<f32>;
-@group(0) @binding(15) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
+@group(0) @binding(7) var<storage, read> least_cosines: array<f32>;
+@group(0) @binding(8) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -79,25 +71,12 @@ fn fs(in: Varying) -> Texel {
     let specular = object.specular * textureSample(specular_map, linear_repeat, specular_at).r;
     let color_at = map_coordinates(object, in.uv, textureDimensions(base_color_map));
     let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
-    var irradiance = transmitted_environment(environment, linear_wrap_u, n, in.sky);
-    for (var i = 0u; i < arrayLength(&lights); i++) {
-        if !wanted {
-            break;
-        }
-        let light = lights[i];
-        let at = incident(light, x);
-        if dot(n, at.direction) <= 0.0 {
-            continue;
-        }
-        var lit = 1.0;
-        if light.views > 0u {
-            let layer = layer_towards(light, -at.direction);
-            lit = shadow(views[layer], layer, at, x, n, dx, dy, shadow_maps, compare_less);
-        }
-        irradiance += transmitted(at, n, specular, lit, rho_dt_table);
+    var L_d = vec3f(0.0);
+    if wanted {
+        L_d = transmitted_irradiance(x, n, specular, in.sky, dx, dy);
     }
     if !wanted {
         discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
     }
-    return Texel(vec4f(irradiance / params.unit * color_before(object, color), 1.0));
+    return Texel(vec4f(L_d / params.unit * color_before(object, color), 1.0));
 }

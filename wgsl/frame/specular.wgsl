@@ -1,61 +1,41 @@
 // Light reflected at the surface of one object: the GGX lobe of each light, and the prefiltered environment.
 
 import package::units::{Number};
-import package::mesh::{ObjectUniforms};
-import package::light::{Light, ShadowView, incident, shadow, layer_towards};
+import package::light::{incident};
+import package::lights::{lights, rho_dt_table, linear_wrap_u, visibility};
 import package::ggx::{ggx_brdf};
 import package::rho_dt::{rho_dt};
 import package::sampling::{map_of_direction};
-import package::screen::{position_of_pixel, direction_to_eye};
-import package::rectangle::{rectangle_corner};
+import package::per_object::{is_other_object, position_at, normal_at, specular_at, sky_at, direction_to_viewer};
 import package::targets::{RGBA32Float};
 
 struct Params {
-    clip_to_world: mat4x4f,
-    eye: vec4f,
-    alpha: Number,
-    eta: Number,
-    rectangle: vec4f, // where the object may be
+    alpha: Number, // GGX width
+    eta: Number,   // refractive index inside over outside
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
-@group(0) @binding(3) var normal: texture_2d<f32>;
-@group(0) @binding(4) var depth: texture_depth_2d;
-@group(0) @binding(5) var<storage, read> lights: array<Light>;
-@group(0) @binding(6) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(7) var shadow_maps: texture_depth_2d_array;
-@group(0) @binding(8) var compare_less: sampler_comparison;
-@group(0) @binding(9) var rho_dt_table: texture_2d<f32>;
-@group(0) @binding(10) var reflection: texture_2d<f32>;
-@group(0) @binding(11) var linear_wrap_u: sampler;
+@group(0) @binding(1) var reflection: texture_2d<f32>; // by mirror direction (prefilter_reflection.wgsl)
 
 struct Pixel {
     @location(0) specular: RGBA32Float, // radiance
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return rectangle_corner(i, params.rectangle);
-}
-
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    let seen = textureLoad(gbuffer_id, texel, 0);
-    if u32(seen.z) != object.id {
+    if is_other_object(texel) {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
-    let n_specular = textureLoad(normal, texel, 0);
-    let n = normalize(n_specular.xyz);
-    let w_o = direction_to_eye(params.eye, x);
-    // What the lobe reflects in all is 1 - rho_dt; the prefiltered environment is its mean radiance. The share of the
-    // sky that is hidden is that of the whole hemisphere, not of the lobe.
+    let x = position_at(texel);
+    let n = normal_at(texel);
+    let w_o = direction_to_viewer(x);
+    // The lobe reflects the share 1 - rho_dt in all; the prefiltered environment is the mean radiance over it. The share of
+    // the sky that is hidden is that of the whole hemisphere, not of the lobe.
     let towards = map_of_direction(reflect(-w_o, n), textureDimensions(reflection));
     let mirrored = textureSampleLevel(reflection, linear_wrap_u, towards, 0.0);
-    var total = seen.w * mirrored.a * mirrored.a * mirrored.rgb * (1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0));
+    let share = 1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0);
+    var total = sky_at(texel) * mirrored.a * mirrored.a * mirrored.rgb * share;
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
         let at = incident(light, x);
@@ -63,12 +43,8 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         if f_r <= 0.0 {
             continue;
         }
-        var lit = 1.0;
-        if light.views > 0u {
-            let layer = layer_towards(light, -at.direction);
-            lit = shadow(views[layer], layer, at, x, n, vec3f(0.0), vec3f(0.0), shadow_maps, compare_less);
-        }
+        let lit = visibility(light, at, x, n, vec3f(0.0), vec3f(0.0));
         total += at.irradiance * (f_r * dot(n, at.direction) * lit);
     }
-    return Pixel(vec4f(total * n_specular.w, 1.0));
+    return Pixel(vec4f(total * specular_at(texel), 1.0));
 }

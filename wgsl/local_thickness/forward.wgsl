@@ -1,10 +1,8 @@
 // M_back of one object: at its vertices, and between them at the pixels.
 
 import package::mesh::{Vertex, ObjectUniforms};
-import package::light::{Light, incident};
-import package::irradiance::{transmitted_environment};
 import package::screen::{direction_to_eye, is_hidden};
-import package::local_thickness::transport::{Transport, let_out, let_out_environment};
+import package::local_thickness::transport::{Transport, light_out};
 import package::targets::{RGBA32Float};
 
 override MAPPED: bool = true; // whether the base colour varies over the object
@@ -20,11 +18,8 @@ struct Params {
 @group(0) @binding(2) var<uniform> object: ObjectUniforms;
 @group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(4) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
-@group(0) @binding(5) var<storage, read> lights: array<Light>;
-@group(0) @binding(6) var environment: texture_2d<f32>;
-@group(0) @binding(7) var linear_wrap_u: sampler;
-@group(0) @binding(8) var base_color: texture_2d<f32>;
-@group(0) @binding(9) var depth: texture_depth_2d;
+@group(0) @binding(5) var base_color: texture_2d<f32>;
+@group(0) @binding(6) var depth: texture_depth_2d;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -41,12 +36,8 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let x = (object.object_to_world * vec4f(vertex.position, 1.0)).xyz;
     let n = (object.object_to_world * vec4f(vertex.normal, 0.0)).xyz;
     let w_o = direction_to_eye(params.eye, x);
-    var light_out = let_out_environment(transport) * transmitted_environment(environment, linear_wrap_u, -n, 1.0);
-    for (var i = 0u; i < arrayLength(&lights); i++) {
-        let at = incident(lights[i], x);
-        light_out += at.irradiance * let_out(transport, at.direction, n, w_o);
-    }
-    return Varying(params.world_to_clip * vec4f(x, 1.0), params.albedo * light_out * thickness[vertex.welded].rgb);
+    let light = light_out(transport, x, n, w_o);
+    return Varying(params.world_to_clip * vec4f(x, 1.0), params.albedo * light * thickness[vertex.welded].rgb);
 }
 
 @fragment

@@ -5,14 +5,13 @@
 // node stands for those below it where it is small enough for the nearest pixel. What is read for a node, which takes
 // longer than what is done with it, is read once for all.
 
-import package::mesh::{ObjectUniforms, color_before, color_after};
+import package::mesh::{color_before, color_after};
+import package::per_object::{object, gbuffer_id, is_other_object, position_at, normal_at, base_color_at};
 import package::point_cloud::tree::{Entering};
 import package::profile_table::{entries_of};
-import package::screen::{position_of_pixel};
 import package::units::{Number, Position, Direction};
 
 struct Params {
-    clip_to_world: mat4x4f,
     near: vec3f,       // share of L_d at x_o itself: what the samples stand too far apart for
     unit: Number,      // of the table, 1/mm^2
     first_entry: u32,  // of the table, as the leading bits of the squared distance
@@ -27,16 +26,11 @@ const BLOCK: u32 = 4u;       // of an invocation
 const NOWHERE: Number = 1e9; // mm: too far for light to get there
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
-@group(0) @binding(3) var normal: texture_2d<f32>;
-@group(0) @binding(4) var base_color: texture_2d<f32>;
-@group(0) @binding(5) var depth: texture_depth_2d;
-@group(0) @binding(6) var irradiance: texture_2d<f32>;
-@group(0) @binding(7) var<storage, read> table: array<u32>; // R_d over the squared distance; 0 in the last
-@group(0) @binding(8) var<storage, read> entering: array<Entering>;
-@group(0) @binding(9) var M_front: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(10) var M_back: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(1) var irradiance: texture_2d<f32>;
+@group(0) @binding(2) var<storage, read> table: array<u32>; // R_d over the squared distance; 0 in the last
+@group(0) @binding(3) var<storage, read> entering: array<Entering>;
+@group(0) @binding(4) var M_front: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(5) var M_back: texture_storage_2d<rgba32float, write>;
 
 // x_o and n_o at two by two pixels, a component of the vectors for each: what is done for one takes no longer for four.
 struct Four {
@@ -55,7 +49,7 @@ struct Sums {
 }
 
 fn is_seen(texel: vec2u) -> bool {
-    return all(texel < textureDimensions(gbuffer_id)) && u32(textureLoad(gbuffer_id, texel, 0).z) == object.id;
+    return all(texel < textureDimensions(gbuffer_id)) && !is_other_object(texel);
 }
 
 fn corner_of(i: u32) -> vec2u {
@@ -71,9 +65,9 @@ fn four(first: vec2u) -> Four {
         let texel = first + corner_of(i);
         x[i] = vec3f(NOWHERE);
         if is_seen(texel) {
-            let at = position_of_pixel(vec2f(texel) + 0.5, depth, params.clip_to_world);
+            let at = position_at(texel);
             x[i] = (at - object.object_to_world[3].xyz) * to_world;
-            n[i] = normalize(textureLoad(normal, texel, 0).xyz) * to_world;
+            n[i] = normal_at(texel) * to_world;
         }
     }
     let across = transpose(mat4x3f(x[0], x[1], x[2], x[3]));
@@ -129,7 +123,7 @@ fn store(first: vec2u, from_nodes: Sums) {
     var sums = from_nodes;
     for (var i = 0u; i < 4u; i++) {
         let texel = first + corner_of(i);
-        let color = textureLoad(base_color, texel, 0).rgb;
+        let color = base_color_at(texel);
         let M = params.unit * sums.M[i] + params.near * color_before(object, color) * textureLoad(irradiance, texel, 0).rgb;
         let back = params.unit * sums.back[i];
         let after = color_after(object, color);

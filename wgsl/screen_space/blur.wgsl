@@ -4,13 +4,11 @@
 // that faces. Weights are of whole pixels, by how many of them a millimetre of the surface spans there.
 
 import package::units::{Length, Number, Position};
-import package::mesh::{ObjectUniforms, color_after};
-import package::rectangle::{rectangle_corner};
+import package::mesh::{color_after};
+import package::per_object::{view, object, base_color_at};
 import package::targets::{RGBA32Float};
 
 struct Params {
-    clip_to_world: mat4x4f,
-    rectangle: vec4f, // where the object may be
     scale: vec3f,   // of what comes out of the second direction
     coarsest: f32,  // pixels per mm of level 0
 }
@@ -23,12 +21,10 @@ struct Tap {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var<storage, read> taps: array<Tap>; // of each level, the one in the middle first
-@group(0) @binding(3) var source: texture_2d<f32>; // alpha: 1 - depth, 0 off the object
-@group(0) @binding(4) var slope: texture_2d<f32>;  // of the depth, per pixel to the right and down
-@group(0) @binding(5) var base_color: texture_2d<f32>;
-@group(0) @binding(6) var before: texture_2d<f32>; // M by the kernel's terms so far, or a single black texel
+@group(0) @binding(1) var<storage, read> taps: array<Tap>; // of each level, the one in the middle first
+@group(0) @binding(2) var source: texture_2d<f32>; // alpha: 1 - depth, 0 off the object
+@group(0) @binding(3) var slope: texture_2d<f32>;  // of the depth, per pixel to the right and down
+@group(0) @binding(4) var before: texture_2d<f32>; // M by the kernel's terms so far, or a single black texel
 
 struct Pixel {
     @location(0) blurred: RGBA32Float, // first direction: as source; second: M in W/m^2
@@ -67,11 +63,6 @@ fn from_middle(step: vec4f, x: Position) -> vec4f {
     return vec4f(step.xyz - x * step.w, step.w);
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return rectangle_corner(i, params.rectangle);
-}
-
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2i(pixel.xy);
@@ -80,12 +71,12 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         discard;
     }
     let per_pixel = vec2f(2.0, -2.0) / vec2f(textureDimensions(source));
-    let here = params.clip_to_world * vec4f(pixel.xy * per_pixel + vec2f(-1.0, 1.0), 1.0 - middle.a, 1.0);
+    let here = view.clip_to_world * vec4f(pixel.xy * per_pixel + vec2f(-1.0, 1.0), 1.0 - middle.a, 1.0);
     let x = here.xyz / here.w;
     let rises = textureLoad(slope, texel, 0).rg;
-    let away = from_middle(params.clip_to_world[2], x);
-    let right = from_middle(params.clip_to_world[0] * per_pixel.x, x) + away * rises.x; // pixel by pixel on the plane
-    let down = from_middle(params.clip_to_world[1] * per_pixel.y, x) + away * rises.y;
+    let away = from_middle(view.clip_to_world[2], x);
+    let right = from_middle(view.clip_to_world[0] * per_pixel.x, x) + away * rises.x; // pixel by pixel on the plane
+    let down = from_middle(view.clip_to_world[1] * per_pixel.y, x) + away * rises.y;
     let t_x = right.xyz / here.w; // mm per pixel
     let t_y = down.xyz / here.w;
     var step = vec2f(1.0, 0.0); // to the next pixel, along the rows or along the columns
@@ -113,7 +104,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     if DIRECTION == 0u {
         return Pixel(vec4f(total, middle.a));
     }
-    let color = params.scale * color_after(object, textureLoad(base_color, texel, 0).rgb);
+    let color = params.scale * color_after(object, base_color_at(vec2u(texel)));
     let so_far = textureLoad(before, min(texel, vec2i(textureDimensions(before)) - 1), 0).rgb;
     return Pixel(vec4f(so_far + total * color, 1.0));
 }

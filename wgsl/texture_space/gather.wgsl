@@ -1,26 +1,18 @@
 // M_front of one object at its pixels: its irradiance maps, each blurred by one Gaussian, summed by weight
 // (Mikkelsen 2009, 3.4, step 4a).
 
-import package::mesh::{ObjectUniforms, color_after};
-import package::rectangle::{rectangle_corner};
+import package::mesh::{color_after};
+import package::per_object::{object, is_other_object, atlas_at, base_color_at};
 import package::targets::{RGBA32Float};
 
-struct Params {
-    weights: array<vec4f, 6>, // rgb of each Gaussian, narrowest first
-    rectangle: vec4f,         // where the object may be
-}
-
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
-@group(0) @binding(3) var base_color: texture_2d<f32>;
-@group(0) @binding(4) var linear_clamp: sampler;
-@group(0) @binding(5) var blurred_0: texture_2d<f32>;
-@group(0) @binding(6) var blurred_1: texture_2d<f32>;
-@group(0) @binding(7) var blurred_2: texture_2d<f32>;
-@group(0) @binding(8) var blurred_3: texture_2d<f32>;
-@group(0) @binding(9) var blurred_4: texture_2d<f32>;
-@group(0) @binding(10) var blurred_5: texture_2d<f32>;
+@group(0) @binding(0) var<uniform> weights: array<vec4f, 6>; // rgb of each Gaussian, narrowest first
+@group(0) @binding(1) var linear_clamp: sampler;
+@group(0) @binding(2) var blurred_0: texture_2d<f32>;
+@group(0) @binding(3) var blurred_1: texture_2d<f32>;
+@group(0) @binding(4) var blurred_2: texture_2d<f32>;
+@group(0) @binding(5) var blurred_3: texture_2d<f32>;
+@group(0) @binding(6) var blurred_4: texture_2d<f32>;
+@group(0) @binding(7) var blurred_5: texture_2d<f32>;
 
 struct Pixel {
     @location(0) M_front: RGBA32Float,
@@ -48,24 +40,18 @@ fn smooth_sample(map: texture_2d<f32>, linear_clamp: sampler, uv: vec2f) -> vec3
     return mean.rgb / max(mean.a, 1e-4);
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return rectangle_corner(i, params.rectangle);
-}
-
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    let seen = textureLoad(gbuffer_id, texel, 0);
-    if u32(seen.z) != object.id {
+    if is_other_object(texel) {
         discard;
     }
-    let uv = seen.xy;
-    var M = params.weights[0].rgb * smooth_sample(blurred_0, linear_clamp, uv);
-    M += params.weights[1].rgb * smooth_sample(blurred_1, linear_clamp, uv);
-    M += params.weights[2].rgb * smooth_sample(blurred_2, linear_clamp, uv);
-    M += params.weights[3].rgb * smooth_sample(blurred_3, linear_clamp, uv);
-    M += params.weights[4].rgb * smooth_sample(blurred_4, linear_clamp, uv);
-    M += params.weights[5].rgb * smooth_sample(blurred_5, linear_clamp, uv);
-    return Pixel(vec4f(M * color_after(object, textureLoad(base_color, texel, 0).rgb), 1.0));
+    let uv = atlas_at(texel);
+    var M = weights[0].rgb * smooth_sample(blurred_0, linear_clamp, uv);
+    M += weights[1].rgb * smooth_sample(blurred_1, linear_clamp, uv);
+    M += weights[2].rgb * smooth_sample(blurred_2, linear_clamp, uv);
+    M += weights[3].rgb * smooth_sample(blurred_3, linear_clamp, uv);
+    M += weights[4].rgb * smooth_sample(blurred_4, linear_clamp, uv);
+    M += weights[5].rgb * smooth_sample(blurred_5, linear_clamp, uv);
+    return Pixel(vec4f(M * color_after(object, base_color_at(texel)), 1.0));
 }

@@ -2,39 +2,31 @@
 // blurred by each Gaussian, weakened by the way from there to x_o (Mikkelsen 2009, 3.4 and figure 10).
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
-import package::mesh::{ObjectUniforms, color_after};
+import package::mesh::{color_after};
 import package::light::{ShadowView, cube_face};
-import package::rectangle::{rectangle_corner};
-import package::screen::{position_of_pixel};
+import package::per_object::{object, is_other_object, position_at, normal_at, base_color_at};
 import package::targets::{RGBA32Float};
 
 override VIEWS: u32 = 1u; // of the light: one of the whole scene, or a cube of 6
 
 struct Params {
-    clip_to_world: mat4x4f,
     light: vec4f,               // xyz, 1: where it is; xyz, 0: the direction towards it
-    rectangle: vec4f,           // where the object may be
     gaussians: array<vec4f, 6>, // rgb: weight; its variance, mm^2
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var gbuffer_id: texture_2d<f32>;
-@group(0) @binding(3) var normal: texture_2d<f32>;
-@group(0) @binding(4) var base_color: texture_2d<f32>;
-@group(0) @binding(5) var depth: texture_depth_2d;
-@group(0) @binding(6) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(7) var entry: texture_2d_array<f32>;
-@group(0) @binding(8) var entry_normal: texture_2d_array<f32>;
-@group(0) @binding(9) var entry_atlas: texture_2d_array<f32>;
-@group(0) @binding(10) var linear_clamp: sampler;
-@group(0) @binding(11) var blurred_0: texture_2d<f32>;
-@group(0) @binding(12) var blurred_1: texture_2d<f32>;
-@group(0) @binding(13) var blurred_2: texture_2d<f32>;
-@group(0) @binding(14) var blurred_3: texture_2d<f32>;
-@group(0) @binding(15) var blurred_4: texture_2d<f32>;
-@group(0) @binding(16) var blurred_5: texture_2d<f32>;
-@group(0) @binding(17) var so_far: texture_2d<f32>; // M_back by the lights before, or a single black texel
+@group(0) @binding(1) var<storage, read> views: array<ShadowView>;
+@group(0) @binding(2) var entry: texture_2d_array<f32>;
+@group(0) @binding(3) var entry_normal: texture_2d_array<f32>;
+@group(0) @binding(4) var entry_atlas: texture_2d_array<f32>;
+@group(0) @binding(5) var linear_clamp: sampler;
+@group(0) @binding(6) var blurred_0: texture_2d<f32>;
+@group(0) @binding(7) var blurred_1: texture_2d<f32>;
+@group(0) @binding(8) var blurred_2: texture_2d<f32>;
+@group(0) @binding(9) var blurred_3: texture_2d<f32>;
+@group(0) @binding(10) var blurred_4: texture_2d<f32>;
+@group(0) @binding(11) var blurred_5: texture_2d<f32>;
+@group(0) @binding(12) var so_far: texture_2d<f32>; // M_back by the lights before, or a single black texel
 
 struct Pixel {
     @location(0) M_back: RGBA32Float,
@@ -78,19 +70,14 @@ fn spline(f: f32) -> vec3f {
     return vec3f(0.5 * g * g, 0.5 + f * g, 0.5 * f * f);
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return rectangle_corner(i, params.rectangle);
-}
-
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
+    if is_other_object(texel) {
         discard;
     }
-    let x_o = position_of_pixel(pixel.xy, depth, params.clip_to_world);
-    let n_o = normalize(textureLoad(normal, texel, 0).xyz);
+    let x_o = position_at(texel);
+    let n_o = normal_at(texel);
     let w_i = normalize(params.light.xyz - x_o * params.light.w);
     let layer = select(0u, cube_face(-w_i), VIEWS == 6u);
     let clip = views[layer].world_to_clip * vec4f(x_o, 1.0);
@@ -117,7 +104,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         M += weight * sum;
         counted += weight; // a ray that passes by says nothing of x_o, which is beside it
     }
-    M *= color_after(object, textureLoad(base_color, texel, 0).rgb) / max(counted, 1e-6);
+    M *= color_after(object, base_color_at(texel)) / max(counted, 1e-6);
     let others = textureLoad(so_far, min(texel, textureDimensions(so_far) - 1u), 0).rgb;
     return Pixel(vec4f(others + M, 1.0));
 }

@@ -2,31 +2,20 @@
 // Real-Time Realistic Skin Translucency).
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
-import package::mesh::{ObjectUniforms};
-import package::light::{Light, ShadowView, Incident, incident, layer_towards, POINT};
+import package::light::{Light, Incident, incident, layer_towards};
+import package::lights::{lights, views, shadow_maps, rho_dt_table};
 import package::rho_dt::{rho_dt};
+import package::per_object::{is_other_object, position_at, normal_at, specular_at};
 import package::profile_table::{root_entry};
-import package::screen::{position_of_pixel};
-import package::rectangle::{rectangle_corner};
 import package::targets::{RGBA32Float};
 
 struct Params {
-    clip_to_world: mat4x4f,
-    rectangle: vec4f, // where the object may be
     shrink: Length,   // how far x_o is moved below the surface where light grazes it
     reach: Length,    // the thickness that the table ends at: no light goes through more
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var<storage, read> through: array<vec3f>; // T over the profile's total, by the square root of the thickness
-@group(0) @binding(3) var gbuffer_id: texture_2d<f32>;
-@group(0) @binding(4) var normal: texture_2d<f32>;
-@group(0) @binding(5) var depth: texture_depth_2d;
-@group(0) @binding(6) var<storage, read> lights: array<Light>;
-@group(0) @binding(7) var<storage, read> views: array<ShadowView>;
-@group(0) @binding(8) var shadow_maps: texture_depth_2d_array;
-@group(0) @binding(9) var rho_dt_table: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> through: array<vec3f>; // T over the profile's total, by the square root of the thickness
 
 struct Pixel {
     @location(0) arriving: RGBA32Float, // W/m^2
@@ -96,20 +85,14 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
     return total;
 }
 
-@vertex
-fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return rectangle_corner(i, params.rectangle);
-}
-
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let texel = vec2u(pixel.xy);
-    if u32(textureLoad(gbuffer_id, texel, 0).z) != object.id {
+    if is_other_object(texel) {
         discard;
     }
-    let x = position_of_pixel(pixel.xy, depth, params.clip_to_world);
-    let n_specular = textureLoad(normal, texel, 0);
-    let n = normalize(n_specular.xyz);
+    let x = position_at(texel);
+    let n = normal_at(texel);
     var total = vec3f(0.0);
     for (var i = 0u; i < arrayLength(&lights); i++) {
         let light = lights[i];
@@ -118,7 +101,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
         if light.views == 0u || cosine == 0.0 {
             continue;
         }
-        let entering = at.irradiance * (cosine * rho_dt(rho_dt_table, cosine, n_specular.w));
+        let entering = at.irradiance * (cosine * rho_dt(rho_dt_table, cosine, specular_at(texel)));
         total += entering * transmittance(thickness(light, at, x, n));
     }
     return Pixel(vec4f(total, 1.0));

@@ -72,7 +72,7 @@ def _make(gpu: Gpu, mesh: Mesh, render_mesh: RenderMesh, size: int) -> Arrays:
     }
     params = {"size": size}
     graph = Graph(gpu)
-    drawn = graph.draw(
+    drawn = graph.draw_outputs(
         "bake/charts",
         size=(size, size),
         depth_buffer="new",
@@ -86,8 +86,9 @@ def _make(gpu: Gpu, mesh: Mesh, render_mesh: RenderMesh, size: int) -> Arrays:
     if len(seams.maps):
         edges = {"a": seams.ends[:, 0], "b": seams.ends[:, 1], "outward": seams.outward}
         count = 6 * len(seams.maps)
-        around = graph.draw("bake/gutter", into=ids, depth_buffer=drawn.depth, count=count, params=params, edges=edges)
-        ids = around.ids
+        ids = graph.draw_outputs(
+            "bake/gutter", into=ids, depth_buffer=drawn.depth, count=count, params=params, edges=edges
+        ).ids
     graph.run(ids, drawn.gradient_u, drawn.gradient_v)
     texels = graph.read(ids)[..., 0].copy()
     gradient_u = graph.read(drawn.gradient_u).copy()

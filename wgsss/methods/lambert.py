@@ -1,38 +1,32 @@
-"""Lambert: light leaves where it entered. What every diffusion profile tends to as its width goes to zero."""
+"""Lambert: light leaves where it enters. Every diffusion profile tends to this as its width goes to zero."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from wgsss import frame as shared
-from wgsss.frame import Frame
+from wgsss.frame import Frame, irradiance_pixels
+from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
 from wgsss.stage import Stage
 
 
 @dataclass(frozen=True)
 class Lambert:
-    """M_front = R_d L_d, R_d being the profile's total reflectance; M_back is part of it."""
+    """M_front is the profile's total reflectance times L_d; it contains the light of M_back."""
 
     source: ClassVar[str] = "the limit of a profile without width"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = ({},)
 
     def bake(self, stage: Stage) -> None:
-        """Nothing."""
+        """Do nothing: there is nothing to precompute."""
 
     def passes(self, frame: Frame) -> Diffused:
-        irradiance = shared.irradiance_pixels(frame)
-        M_front: Any = None
-        for body in frame.stage.bodies:
-            M_front = frame.graph.draw(
-                "lambert/reflect",
-                into=M_front,
-                size=frame.size,
-                count=6,
-                params={"total": body.material.profile.total, "rectangle": shared.rectangle(frame, body)},
-                object=body.object_uniforms,
-                irradiance=irradiance,
-                **frame.gbuffer_bindings("gbuffer_id", "base_color"),
-            )
-        return Diffused(M_front)
+        return Diffused(M_front=reflect(frame, irradiance_pixels(frame)))
+
+
+def reflect(frame: Frame, irradiance: Handle, label: str = "") -> Handle:
+    """Return M, W/m^2, where light leaves at the pixel at which it enters as `irradiance`."""
+    return frame.per_object(
+        "lambert/reflect", lambda body: {"total": body.material.profile.total}, label=label, irradiance=irradiance
+    )

@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from wgsss.bake.thickness import local_thickness
 from wgsss.errors import InputError, unknown
-from wgsss.frame import Frame, rectangle
+from wgsss.frame import Frame
+from wgsss.gpu import Buffer
 from wgsss.graph import Handle
 from wgsss.methods.method import Method
 from wgsss.stage import Body, Stage
@@ -107,76 +108,68 @@ class LocalThickness:
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:
         maps = {body: self._upload(body) for body in frame.stage.bodies}
-        shown = {body: thickness for body, thickness in maps.items() if thickness is not None}
-        if not shown:
+        translucent = {body: thickness for body, thickness in maps.items() if thickness is not None}
+        if not translucent:
             return None
-        return self._forward(frame, shown) if self.stored == "vertices" else self._deferred(frame, shown)
+        return self._forward(frame, translucent) if self.stored == "vertices" else self._deferred(frame, translucent)
 
-    def _upload(self, body: Body) -> Any:
-        """The map on the device; None where nothing comes through."""
+    def _upload(self, body: Body) -> Buffer | None:
+        """Return the map on the device; None where no light comes through."""
 
-        def make() -> Any:
-            found = self.map(body)
-            return body.stage.gpu.buffer(np.pad(found, ((0, 0), (0, 1)))) if found.any() else None
+        def make() -> Buffer | None:
+            thickness = self.map(body)
+            return body.stage.gpu.buffer(np.pad(thickness, ((0, 0), (0, 1)))) if thickness.any() else None
 
         key = ("local thickness map", id(body.rest.mesh), id(body.material), self.thickness)
         return body.stage.shared(key, make)
 
-    def _forward(self, frame: Frame, shown: dict[Body, Any]) -> Handle:
-        M_back: Any = None
-        for body, thickness in shown.items():
+    def _forward(self, frame: Frame, translucent: dict[Body, Buffer]) -> Handle | None:
+        """Return M_back, computed at the vertices and interpolated between them."""
+        module = "local_thickness/forward"
+        M_back: Handle | None = None
+        for body, thickness in translucent.items():
             M_back = frame.graph.draw(
-                "local_thickness/forward",
+                module,
                 into=M_back,
                 size=frame.size,
                 indices=body.indices,
                 constants={"MAPPED": body.is_coloured},
-                params={"world_to_clip": frame.view.world_to_clip, **_seen(frame, body)},
+                params={"world_to_clip": frame.view.world_to_clip, "eye": frame.view.eye, "albedo": _albedo(body)},
                 vertices=body.vertices,
                 thickness=thickness,
                 transport=self._transport(body),
-                **_lit(frame, body),
+                **frame.bindings(module, body),
             )
         return M_back
 
-    def _deferred(self, frame: Frame, shown: dict[Body, Any]) -> Handle:
-        """All objects are drawn to one target, and lit from what it has."""
+    def _deferred(self, frame: Frame, translucent: dict[Body, Buffer]) -> Handle:
+        """Return M_back, computed at the pixels from a target into which all bodies draw their thickness."""
         sets = self._sets(frame.stage)
         coloured = self.thickness == "coloured"
         constants = {"COLOURED": coloured, "BITS": 0 if len(sets) == 1 else 1 if coloured else 2}
-        stored: Any = None
-        for body, thickness in shown.items():
+        module = "local_thickness/gbuffer"
+        stored: Handle | None = None
+        for body, thickness in translucent.items():
             stored = frame.graph.draw(
-                "local_thickness/gbuffer",
+                module,
                 into=stored,
                 size=frame.size,
                 indices=body.indices,
                 constants=constants,
                 params={"world_to_clip": frame.view.world_to_clip, "which": sets.index(self._transport(body))},
-                object=body.object_uniforms,
                 vertices=body.vertices,
                 thickness=thickness,
-                **frame.gbuffer_bindings("depth"),
+                **frame.bindings(module, body),
             )
-        M_back: Any = None
-        for body in shown:
-            M_back = frame.graph.draw(
-                "local_thickness/deferred",
-                into=M_back,
-                size=frame.size,
-                count=6,
-                constants=constants,
-                params={
-                    "clip_to_world": frame.view.clip_to_world,
-                    "rectangle": rectangle(frame, body),
-                    **_seen(frame, body),
-                },
-                transports=sets,
-                stored=stored,
-                **frame.gbuffer_bindings("gbuffer_id", "normal"),
-                **_lit(frame, body),
-            )
-        return M_back
+        assert stored is not None
+        return frame.per_object(
+            "local_thickness/deferred",
+            lambda body: {"albedo": _albedo(body)},
+            bodies=translucent,
+            constants=constants,
+            transports=sets,
+            stored=stored,
+        )
 
     def _transport(self, body: Body) -> dict[str, float]:
         """The parameters of a body: its material's own, or the knobs."""
@@ -193,15 +186,7 @@ class LocalThickness:
         return found
 
 
-def _lit(frame: Frame, body: Body) -> dict[str, Any]:
-    return {
-        "object": body.object_uniforms,
-        "lights": frame.lighting.lights,
-        "environment": body.environment.irradiance,
-        **frame.gbuffer_bindings("base_color", "depth"),
-    }
-
-
-def _seen(frame: Frame, body: Body) -> dict[str, Any]:
-    """`albedo` is the printed cDiffuseAlbedo, but for the base colour's map."""
-    return {"eye": frame.view.eye, "albedo": body.material.profile.total * body.material.base_color}
+def _albedo(body: Body) -> Array:
+    """Return the printed cDiffuseAlbedo (3,), without the base colour's map."""
+    albedo: Array = body.material.profile.total * body.material.base_color
+    return albedo

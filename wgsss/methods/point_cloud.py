@@ -14,13 +14,13 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import frame as shared
 from wgsss import wgsl
 from wgsss.bake.point_cloud import PointCloud as Cloud
 from wgsss.bake.point_cloud import point_cloud
 from wgsss.cache import Arrays, cached
-from wgsss.frame import Frame
-from wgsss.graph import Handle
+from wgsss.frame import Frame, irradiance_pixels, irradiance_points
+from wgsss.gpu import Buffer
+from wgsss.graph import Handle, Outputs
 from wgsss.methods.method import Diffused
 from wgsss.optics import Profile
 from wgsss.optics.lookup import interval_middles, leading_bits
@@ -83,34 +83,28 @@ class PointCloud:
         return body.stage.shared(key, lambda: kernel(profile, NEAR * cloud.spacing, 2.0 * size))
 
     def passes(self, frame: Frame) -> Diffused:
-        irradiance = shared.irradiance_pixels(frame)
+        irradiance = irradiance_pixels(frame)
         tile = wgsl.load(_GATHER).constants["TILE"]
-        M: dict[str, Any] = {
-            name: frame.graph.texture(name, (*frame.size, 1), "rgba32float") for name in ("M_front", "M_back")
-        }
+        M = Outputs(
+            {name: frame.graph.texture(name, (*frame.size, 1), "rgba32float") for name in ("M_front", "M_back")}
+        )
         for body in frame.stage.bodies:
             kernel = self.kernel(body)
-            gathered = frame.graph.dispatch(
+            M = frame.graph.dispatch_outputs(
                 _GATHER,
                 size=(64 * -(-frame.size[0] // tile), -(-frame.size[1] // tile)),
-                params={
-                    "clip_to_world": frame.view.clip_to_world,
-                    "near": kernel.near,
-                    "unit": kernel.unit,
-                    "first_entry": kernel.first,
-                },
+                params={"near": kernel.near, "unit": kernel.unit, "first_entry": kernel.first},
                 constants={"FIRST": body.index == 0},
-                object=body.object_uniforms,
                 irradiance=irradiance,
                 table=self._table(body),
                 entering=self._entering(frame, body),
-                **M,
-                **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
+                M_front=M.M_front,
+                M_back=M.M_back,
+                **frame.bindings(_GATHER, body),
             )
-            M = vars(gathered)
-        return Diffused(M["M_front"], M["M_back"])
+        return Diffused(M.M_front, M.M_back)
 
-    def _table(self, body: Body) -> Any:
+    def _table(self, body: Body) -> Buffer:
         kernel = self.kernel(body)
         return body.stage.shared(("table", id(kernel)), lambda: body.stage.gpu.buffer(kernel.packed))
 
@@ -118,7 +112,7 @@ class PointCloud:
         """What the nodes of a body's octree stand for, from the samples up."""
         graph, posed, cloud = frame.graph, self._posed(body), self.cloud(body)
         tree, params = cloud.tree, {"epsilon": self.epsilon, "farthest": self.kernel(body).r[-1]}
-        irradiance = shared.irradiance_points(frame, body, posed.points, len(cloud.samples.face), cloud.samples)
+        irradiance = irradiance_points(frame, body, posed.points, len(cloud.samples.face), cloud.samples)
         entering = graph.dispatch(
             "point_cloud/enter_samples",
             size=len(tree.first),
@@ -138,11 +132,11 @@ class PointCloud:
             )
         return entering
 
-    def _heights(self, body: Body) -> list[tuple[int, Any]]:
+    def _heights(self, body: Body) -> list[tuple[int, Buffer]]:
         """How many nodes there are of each height from 1 on, and a buffer of which they are."""
         cloud, gpu = self.cloud(body), body.stage.gpu
 
-        def make() -> list[tuple[int, Any]]:
+        def make() -> list[tuple[int, Buffer]]:
             chosen = [nodes.astype(np.uint32) for nodes, _, _ in cloud.tree.levels()][1:]
             return [(len(nodes), gpu.buffer(nodes)) for nodes in chosen]
 
@@ -235,9 +229,9 @@ def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
 class Posed:
     """A point cloud at one time on the device, in object space."""
 
-    points: Any
+    points: Buffer
     """buffer of array<Vertex>: the samples"""
-    nodes: Any
+    nodes: Buffer
     """buffer of array<Node> (wgsl/point_cloud/tree.wgsl)"""
 
 

@@ -18,11 +18,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wgsss import frame as shared
 from wgsss import wgsl
 from wgsss.errors import InputError, unknown
-from wgsss.frame import Frame, rectangle
-from wgsss.gpu import Gpu
+from wgsss.frame import Frame, irradiance_pixels
+from wgsss.gpu import Buffer, Gpu
 from wgsss.graph import Handle
 from wgsss.methods.method import Diffused
 from wgsss.optics.separable import KERNELS, Term
@@ -64,10 +63,10 @@ class ScreenSpace:
         for body in stage.bodies:
             self._terms(body)
 
-    def weights(self, body: Body, taps: int) -> list[tuple[Taps, Any]]:
+    def weights(self, body: Body, taps: int) -> list[tuple[Taps, Buffer]]:
         """The kernel of a body's material by so many taps, a term and its buffer for each pair of passes."""
 
-        def make() -> list[tuple[Taps, Any]]:
+        def make() -> list[tuple[Taps, Buffer]]:
             terms = self._terms(body)
             found = [Taps(term, terms[0], taps // 2) for term in terms]
             return [(t, t.upload(body.stage.gpu)) for t in found]
@@ -79,55 +78,49 @@ class ScreenSpace:
         return body.stage.shared(("terms", id(material), self.kernel), lambda: KERNELS[self.kernel](material.profile))
 
     def passes(self, frame: Frame) -> Diffused:
-        return Diffused(frame.once(self, lambda: self.diffuse(frame, shared.irradiance_pixels(frame))))
+        return Diffused(frame.once(self, lambda: self.diffuse(frame, irradiance_pixels(frame))))
 
     def diffuse(self, frame: Frame, irradiance: Handle, behind: Handle | None = None) -> Handle:
-        """M of what enters at the pixels, W/m^2, and of what arrives there from behind as if it entered."""
-        M: Any = None
+        """Return M, W/m^2, of the light that enters at the pixels, and of the light that arrives there from `behind`,
+        which is blurred as if it entered."""
+        M: Handle | None = None
         for body in frame.stage.bodies:
             M = self._diffuse(frame, body, irradiance, behind, M)
+        assert M is not None, "a stage has a body"
         return M
 
     def _diffuse(
         self, frame: Frame, body: Body, irradiance: Handle, behind: Handle | None, into: Handle | None
     ) -> Handle:
-        """That of one body, drawn onto `into`."""
-        graph = frame.graph
-        where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
-        entered = graph.draw(
-            "screen_space/enter",
+        """Return M of one body, drawn onto `into`."""
+        module = "screen_space/enter"
+        entered = frame.graph.draw_outputs(
+            module,
             size=frame.size,
             count=6,
-            object=body.object_uniforms,
-            params=where,
             irradiance=irradiance,
             behind=behind or frame.stage.gpu.black,
-            **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
+            **frame.bindings(module, body),
         )
+        M: Handle | None = None
         terms = self.weights(body, self.taps or taps_for(frame, body))
-        M: Any = frame.stage.gpu.black
         for i, (taps, buffer) in enumerate(terms):
-            before, M = M, entered.entering
+            before, source = M or frame.stage.gpu.black, entered.entering
             for direction in (0, 1):
-                M = graph.draw(
+                source = frame.draw_object(
                     "screen_space/blur",
-                    size=frame.size,
-                    count=6,
+                    body,
                     into=into if direction == 1 and i == len(terms) - 1 else None,
                     label="xy"[direction],
-                    params={
-                        "scale": taps.scale,
-                        "coarsest": taps.pixels_per_mm[0],
-                        **where,
-                    },
                     constants={"DIRECTION": direction},
-                    object=body.object_uniforms,
+                    params={"scale": taps.scale, "coarsest": taps.pixels_per_mm[0]},
                     taps=buffer,
-                    source=M,
+                    source=source,
                     slope=entered.slope,
                     before=before,
-                    **frame.gbuffer_bindings("base_color"),
                 )
+            M = source
+        assert M is not None, "a kernel has a term"
         return M
 
 
@@ -167,7 +160,7 @@ class Taps:
         self.weight[:, 1:] *= 0.5
         self.scale = term.scale
 
-    def upload(self, gpu: Gpu) -> Any:
+    def upload(self, gpu: Gpu) -> Buffer:
         """A buffer of array<Tap> of wgsl/screen_space/blur.wgsl, level by level."""
         value = {"weight": self.weight.reshape(-1, 3), "offset": self.offset.ravel()}
         return gpu.buffer(wgsl.load("screen_space/blur").layout("array<Tap>").pack(value))

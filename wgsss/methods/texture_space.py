@@ -6,6 +6,7 @@ starting from the last result, since the variances of successive Gaussians add u
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -14,8 +15,9 @@ import numpy as np
 from wgsss import frame as shared
 from wgsss.bake.charts import Charts
 from wgsss.bake.charts import charts as make_charts
-from wgsss.frame import Frame, rectangle
-from wgsss.graph import Handle
+from wgsss.frame import Frame
+from wgsss.gpu import Texture
+from wgsss.graph import Bindings, Handle, Outputs
 from wgsss.methods.method import Diffused
 from wgsss.optics import SumOfGaussians, fit_shared_gaussians
 from wgsss.stage import Body, Stage
@@ -76,32 +78,24 @@ class TextureSpace:
         )
 
     def passes(self, frame: Frame) -> Diffused:
-        M_front: Any = None
+        M_front: Handle | None = None
         for body in frame.stage.bodies:
             if maps := self.maps(frame, body):
                 M_front = self._gather(frame, body, maps, M_front)
-        if M_front is None:  # nothing is in the image
+        if M_front is None:  # no body is in the image
             M_front = self._gather(frame, frame.stage.bodies[0], [frame.stage.gpu.black], None)
         return Diffused(M_front)
 
     def maps(self, frame: Frame, body: Body) -> list[Handle]:
-        """What a body's pixels are gathered from: its blurred maps, narrowest Gaussian first; none if it has none."""
+        """Return the blurred maps that a body's pixels read, narrowest Gaussian first; none if the image shows none of
+        it."""
         return self.blurs(frame, body)
 
-    def _gather(self, frame: Frame, body: Body, maps: list[Any], into: Handle | None) -> Any:
-        """M_front of a body, drawn onto `into`: the sum of its maps by the profile's weights."""
+    def _gather(self, frame: Frame, body: Body, maps: Sequence[Handle | Texture], into: Handle | None) -> Handle:
+        """Return M_front of a body, drawn onto `into`: the sum of its maps by the profile's weights."""
         weights = np.zeros((SLOTS, 4))
         weights[: len(maps), :3] = self.profile(body).weights[: len(maps)] * frame.lighting.unit
-        return frame.graph.draw(
-            "texture_space/gather",
-            into=into,
-            size=frame.size,
-            count=6,
-            params={"weights": weights, "rectangle": rectangle(frame, body)},
-            object=body.object_uniforms,
-            **by_slot(maps),
-            **frame.gbuffer_bindings("gbuffer_id", "base_color"),
-        )
+        return frame.draw_object("texture_space/gather", body, into=into, weights=weights, **by_slot(maps))
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:
         """A body's irradiance map, in `lighting.unit`, blurred by each Gaussian of its profile, narrowest first."""
@@ -116,16 +110,18 @@ class TextureSpace:
         so, and do not count where others have one."""
         graph, sizes = frame.graph, self.sizes(body)
 
-        def over(module: str, size: int, **rest: Any) -> Any:
+        def over(module: str, size: int, label: str = "", **options: Any) -> Outputs:
             charts = atlas(body, size)
-            return graph.draw(module, size=(size, size), ids=charts.ids, seams=charts.seams, **rest)
+            return graph.draw_outputs(
+                module, size=(size, size), label=label, ids=charts.ids, seams=charts.seams, **options
+            )
 
-        drawn = over("texture_space/dilate", self.map_size, depth_buffer="new", source=irradiance)
-        blurred, masks = drawn.dilated, {self.map_size: drawn.depth}
+        dilated = over("texture_space/dilate", self.map_size, depth_buffer="new", source=irradiance)
+        blurred, masks = dilated.dilated, {self.map_size: dilated.depth}
         for size in {*sizes} - {self.map_size}:
-            masks[size] = over("texture_space/mask", size, label=str(size), depth_buffer="new", source=irradiance)
+            masks[size] = over("texture_space/mask", size, str(size), depth_buffer="new", source=irradiance).depth
         reached = 0.0
-        found: list[Handle] = []
+        by_gaussian: list[Handle] = []
         for k, (variance, map_size) in enumerate(zip(self.profile(body).variances, sizes, strict=True)):
             charts = atlas(body, map_size)
             widths = {"variance": variance, "reached": reached, "finer": blurred.size[0] / map_size}
@@ -134,8 +130,8 @@ class TextureSpace:
                 drawn = over(
                     "texture_space/blur",
                     map_size,
+                    f"{variance:.3g} mm2 {'uv'[direction]}",
                     depth_buffer=masks[map_size],
-                    label=f"{variance:.3g} mm2 {'uv'[direction]}",
                     params={"axis": _AXES[k % 3], "direction": direction, "depth": nearer, **widths},
                     source=blurred,
                     gradient_u=charts.gradient_u,
@@ -143,8 +139,8 @@ class TextureSpace:
                 )
                 blurred, masks[map_size] = drawn.blurred, drawn.depth
             reached = float(variance)
-            found.append(blurred)
-        return found
+            by_gaussian.append(blurred)
+        return by_gaussian
 
 
 def atlas(body: Body, size: int) -> Charts:
@@ -153,6 +149,6 @@ def atlas(body: Body, size: int) -> Charts:
     return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, surface, size))
 
 
-def by_slot(maps: list[Any]) -> dict[str, Any]:
-    """Blurred maps by binding name; slots to spare have the last one, and no weight."""
+def by_slot(maps: Sequence[Handle | Texture]) -> Bindings:
+    """Return blurred maps by binding name. Spare bindings get the last map; its weight there is 0."""
     return {f"blurred_{i}": maps[min(i, len(maps) - 1)] for i in range(SLOTS)}

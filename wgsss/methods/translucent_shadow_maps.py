@@ -26,15 +26,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from wgsss.bake.environment import NO_SKY, prefilter
-from wgsss.emitters import emitters
-from wgsss.frame import Frame, rectangle
-from wgsss.graph import Handle
+from wgsss.emitters import LightValue, ShadowViewValue, emitters
+from wgsss.frame import Frame
+from wgsss.graph import Handle, Outputs
 from wgsss.methods.method import Method
 from wgsss.methods.texture_space import SLOTS, TextureSpace, by_slot
 from wgsss.scene import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
@@ -66,8 +65,8 @@ class TranslucentShadowMaps:
         return M_back
 
 
-def _lights(frame: Frame) -> Iterator[tuple[Source, list[dict[str, Any]]]]:
-    """The lights that are not dark, but for the sky, each with its share of `lighting.lights`."""
+def _lights(frame: Frame) -> Iterator[tuple[Source, list[LightValue]]]:
+    """Yield the lights that are not black, but for environments, each with its part of `lighting.lights`."""
     first = 0
     for light in frame.stage.lights:
         if isinstance(light, EnvironmentLight):
@@ -79,80 +78,71 @@ def _lights(frame: Frame) -> Iterator[tuple[Source, list[dict[str, Any]]]]:
 
 
 def _through(
-    frame: Frame, surface: TextureSpace, light: Source, own: list[dict[str, Any]] | None, so_far: Handle | None
+    frame: Frame, surface: TextureSpace, light: Source, own: list[LightValue] | None, so_far: Handle | None
 ) -> Handle:
-    """M_back by a light, added to what there is `so_far`. It has maps of what its `own` emitters give, if not the
-    surface's."""
+    """Return M_back by one light, added to that of the lights before, `so_far`. Its maps are those of the irradiance by
+    its `own` emitters alone or, where that is None, the surface's."""
     stage = frame.stage
-    alone = frame if own is None else _lit_by(frame, own)
-    M_back: Any = None
+    lit = frame if own is None else _lit_by(frame, own)
+    M_back: Handle | None = None
     for body in stage.bodies:
-        blurred = surface.blurs(alone, body if own is None else _without_sky(body))
+        blurred = surface.blurs(lit, body if own is None else _without_sky(body))
         profile = surface.profile(body)
         gaussians = np.zeros((SLOTS, 4))
         gaussians[:, 3] = 1.0
         gaussians[: len(blurred), :3] = profile.weights * frame.lighting.unit
         gaussians[: len(blurred), 3] = profile.variances
-        seen = _seen_from(light, body)
-        where = _first_hit(frame, body, seen.views)
-        M_back = frame.graph.draw(
+        towards, views = _views_of(light, body)
+        hit = _first_hit(frame, body, views)
+        M_back = frame.draw_object(
             "translucent_shadow_maps/transmit",
+            body,
             into=M_back,
-            size=frame.size,
-            count=6,
-            constants={"VIEWS": len(seen.views)},
-            params={
-                "clip_to_world": frame.view.clip_to_world,
-                "light": seen.light,
-                "rectangle": rectangle(frame, body),
-                "gaussians": gaussians,
-            },
-            object=body.object_uniforms,
-            views=seen.views,
-            entry=where.x_i,
-            entry_normal=where.n_i,
-            entry_atlas=where.atlas,
+            constants={"VIEWS": len(views)},
+            params={"light": towards, "gaussians": gaussians},
+            views=views,
+            entry=hit.x_i,
+            entry_normal=hit.n_i,
+            entry_atlas=hit.atlas,
             so_far=so_far or stage.gpu.black,
             **by_slot(blurred),
-            **frame.gbuffer_bindings("gbuffer_id", "normal", "base_color", "depth"),
         )
+    assert M_back is not None, "a stage has a body"
     return M_back
 
 
-def _seen_from(light: Source, body: Body) -> SimpleNamespace:
-    """`views` of a body, as shadows have them; `light`: xyz, 1 where they are from, or xyz, 0 the direction there."""
+def _views_of(light: Source, body: Body) -> tuple[tuple[float, ...], list[ShadowViewValue]]:
+    """Return where a light is (xyz, 1) or the direction towards it (xyz, 0), and its shadow views of a body."""
     points = body.stage.scene.objects[body.index].placed
     if isinstance(light, DirectionalLight):
-        return SimpleNamespace(views=emitters([light], points).views, light=(*np.negative(light.direction), 0.0))
+        return (*np.negative(light.direction), 0.0), emitters([light], points).views
     centre = PointLight(light.position, (1.0, 1.0, 1.0))
-    return SimpleNamespace(views=emitters([centre], points).views, light=(*light.position, 1.0))
+    return (*light.position, 1.0), emitters([centre], points).views
 
 
-def _first_hit(frame: Frame, body: Body, views: list[dict[str, Any]]) -> SimpleNamespace:
+def _first_hit(frame: Frame, body: Body, views: list[ShadowViewValue]) -> Outputs:
     """Draw where the rays of each view first hit a body: the outputs of `first_hit.wgsl`, one layer for each view."""
     side, layers = SIDE[len(views)], len(views)
     formats = {"x_i": "rgba32float", "n_i": "rgba16float", "atlas": "rg32float", "depth": "depth32float"}
-    made = {name: frame.graph.texture(name, (side, side, layers), kind) for name, kind in formats.items()}
+    hit = Outputs({name: frame.graph.texture(name, (side, side, layers), kind) for name, kind in formats.items()})
     for layer, view in enumerate(views):
-        depth = made.pop("depth")
-        drawn = frame.graph.draw(
+        hit = frame.graph.draw_outputs(
             "translucent_shadow_maps/first_hit",
             size=(side, side),
             indices=body.indices,
-            into=made,
-            depth_buffer=depth,
+            into=hit,
+            depth_buffer=hit.depth,
             layer=layer,
             params={"world_to_clip": view["world_to_clip"]},
             object=body.object_uniforms,
             vertices=body.vertices,
         )
-        made = vars(drawn)
-    return SimpleNamespace(**made)
+    return hit
 
 
-def _lit_by(frame: Frame, emitted: list[dict[str, Any]]) -> Frame:
-    """The frame under these emitters alone."""
-    return replace(frame, lighting=SimpleNamespace(**{**vars(frame.lighting), "lights": emitted}), made={})
+def _lit_by(frame: Frame, emitted: list[LightValue]) -> Frame:
+    """Return the frame lit by these emitters alone."""
+    return replace(frame, lighting=replace(frame.lighting, lights=emitted), shared={})
 
 
 def _without_sky(body: Body) -> Body:

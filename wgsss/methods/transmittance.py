@@ -31,8 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wgsss import wgsl
-from wgsss.frame import Frame, irradiance_pixels, rectangle
-from wgsss.graph import Handle
+from wgsss.frame import Frame, irradiance_pixels
+from wgsss.gpu import Buffer
+from wgsss.graph import Bindings, Handle
+from wgsss.methods.lambert import reflect
 from wgsss.methods.method import Method
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.optics import Profile
@@ -58,10 +60,10 @@ class Transmittance:
         for body in stage.bodies:
             self.table(body)
 
-    def table(self, body: Body) -> tuple[dict[str, float], Any]:
+    def table(self, body: Body) -> tuple[dict[str, float], Buffer]:
         """What a body's material lets through: its lengths, by the names of the shader's parameters, and a buffer."""
 
-        def make() -> tuple[dict[str, float], Any]:
+        def make() -> tuple[dict[str, float], Buffer]:
             profile = body.material.profile
             thickness, through = table(profile)
             packed = wgsl.load("transmittance/transmit").layout("array<vec3f>").pack(through)
@@ -76,20 +78,7 @@ class Transmittance:
             return None
         if isinstance(surface, ScreenSpace):
             return surface.diffuse(frame, arriving)
-        M_back: Any = None
-        for body in frame.stage.bodies:
-            M_back = frame.graph.draw(
-                "lambert/reflect",
-                into=M_back,
-                size=frame.size,
-                count=6,
-                label="back",
-                params={"total": body.material.profile.total, "rectangle": rectangle(frame, body)},
-                object=body.object_uniforms,
-                irradiance=arriving,
-                **frame.gbuffer_bindings("gbuffer_id", "base_color"),
-            )
-        return M_back
+        return reflect(frame, arriving, label="back")
 
     def M(self, frame: Frame, surface: Method) -> Handle | None:
         """One blur in screen space of what enters and what arrives from behind is M_front + M_back of two."""
@@ -105,21 +94,11 @@ class Transmittance:
         return frame.once("arriving", lambda: self._arriving(frame))
 
     def _arriving(self, frame: Frame) -> Handle:
-        arriving: Any = None
-        for body in frame.stage.bodies:
+        def values(body: Body) -> Bindings:
             lengths, through = self.table(body)
-            where = {"clip_to_world": frame.view.clip_to_world, "rectangle": rectangle(frame, body)}
-            arriving = frame.graph.draw(
-                "transmittance/transmit",
-                into=arriving,
-                size=frame.size,
-                count=6,
-                params={**lengths, **where},
-                through=through,
-                **frame.gbuffer_bindings("gbuffer_id", "normal", "depth"),
-                **frame.light_bindings(body),
-            )
-        return arriving
+            return {"params": lengths, "through": through}
+
+        return frame.per_object("transmittance/transmit", values)
 
 
 def table(profile: Profile) -> tuple[Array, Array]:

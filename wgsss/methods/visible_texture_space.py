@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import frame as shared
 from wgsss.bake.normal_spread import normal_spread
-from wgsss.frame import Frame
+from wgsss.frame import Frame, irradiance_texels
+from wgsss.gpu import Buffer
 from wgsss.graph import Handle
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.scene import Mesh
@@ -71,7 +71,7 @@ class VisibleTextureSpace(TextureSpace):
         if not culled and not self.clipped:
             return smaller.blurs(frame, body)
         least = self.least_cosines(body) if culled else None
-        irradiance = shared.irradiance_texels(frame, body, size, least_cosines=least, planes=planes)
+        irradiance = irradiance_texels(frame, body, size, least_cosines=least, planes=planes)
         return smaller.blur(frame, body, irradiance)
 
     def size_seen(self, frame: Frame, body: Body) -> int:
@@ -80,7 +80,7 @@ class VisibleTextureSpace(TextureSpace):
         s = min(TEXELS_PER_PIXEL * pixels_per_mm / self.texels_per_mm(body), 1.0)
         return min(size for size in self.steps() if size >= s * self.map_size or size == self.map_size)
 
-    def least_cosines(self, body: Body) -> Any:
+    def least_cosines(self, body: Body) -> Buffer:
         """A buffer of array<f32>: the cosine of the angle from the viewer, beyond which render vertices are not lit.
 
         That is 105 degrees, as in the paper, and more where the surface turns by more than 15 within the distance that
@@ -88,7 +88,7 @@ class VisibleTextureSpace(TextureSpace):
         """
         stage, distance = body.stage, self.spread(body)
 
-        def make() -> Any:
+        def make() -> Buffer:
             render_mesh = body.render_mesh
             spread = normal_spread(body.rest.mesh.positions[render_mesh.vertex], render_mesh.normals, distance)
             return stage.gpu.buffer(np.minimum(LEAST_COSINE, -np.sin(np.minimum(spread, np.pi / 2))).astype(np.float32))

@@ -142,7 +142,7 @@ def pixel_receivers(frame: Frame) -> Any:
     drawn: Any = None
     for body in frame.stage.bodies:
         targets = {} if drawn is None else {n: getattr(drawn, n) for n in ("place", "color")}
-        drawn = frame.graph.draw(
+        drawn = frame.graph.draw_outputs(
             "reference/integral_receivers",
             size=frame.size,
             count=3 * len(body.mesh.faces),

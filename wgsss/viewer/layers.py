@@ -47,14 +47,13 @@ def scene_layer(frame: Frame, layer: str) -> Handle | None:
         if not frame.lighting.views:
             return None
         size = frame.lighting.shadow_maps.size[:2]
-        shown: Handle = graph.draw("viewer/shadow", size=size, shadow_maps=frame.lighting.shadow_maps)
-        return shown
+        return graph.draw("viewer/shadow", size=size, shadow_maps=frame.lighting.shadow_maps)
     drawn: Any = None
     for body in stage.bodies:
         colors = stage.shared(
             (layer, id(body.rest.mesh), id(body.material)), partial(_upload, stage.gpu, _PAINTED[layer], body)
         )
-        drawn = graph.draw(
+        drawn = graph.draw_outputs(
             "viewer/paint",
             size=frame.size,
             indices=body.indices,

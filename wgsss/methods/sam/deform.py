@@ -134,7 +134,7 @@ def posed(graph: Graph, body: Body, plan: Plan, points: Any) -> SimpleNamespace:
     """
     held = deforming(body, plan)
     size = len(plan.points.face) + plan.nodes
-    found = graph.dispatch("sam/fans", size=size, points=points, starts=held.starts, corners=held.corners)
+    found = graph.dispatch_outputs("sam/fans", size=size, points=points, starts=held.starts, corners=held.corners)
     return SimpleNamespace(places=over_nodes(graph, plan, "sam/places", "places", places=found.places), area=found.area)
 
 

@@ -131,7 +131,7 @@ class SenderSearch:
         graph = Graph(self.gpu)
         written: dict[str, Any] = {}
         for _ in range(passes):
-            result = graph.dispatch(
+            result = graph.dispatch_outputs(
                 _MODULE,
                 size=len(groups) * self.group * self.count,
                 params={
@@ -147,7 +147,7 @@ class SenderSearch:
                 candidates={"block": blocks[bound > 0.0], "bound": bound[bound > 0.0]},
                 **written,
             )
-            written = vars(result)
+            written = result
         graph.run(result.cursors, result.entries)
         entries = graph.read(result.entries).reshape(len(groups), self.group, self.count)
         cursors = graph.read(result.cursors)[: len(groups) * self.invocations].reshape(len(groups), self.invocations)
