@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from wgsss.gpu import default_gpu
-from wgsss.methods import make_method
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.separable import KERNELS
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, Mesh, Object, OrthographicCamera, Scene, material
 from wgsss.scene.material import Maps

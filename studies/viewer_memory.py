@@ -16,7 +16,7 @@ from pathlib import Path
 
 from wgsss.errors import InputError
 from wgsss.gpu import default_gpu
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method
+from wgsss.registry import METHODS, SURFACES, TRANSLUCENCIES, make_method
 from wgsss.viewer.pace import SCALES
 from wgsss.viewer.state import Source, State
 from wgsss.viewer.window import Window, loop

@@ -23,10 +23,10 @@ from conftest import DATA
 from wgsss.frame import begin
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
-from wgsss.methods import METHODS, make_method
 from wgsss.optics import Layer
 from wgsss.reference.integral import integral
 from wgsss.reference.photons import trace
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 from wgsss.study.metrics import errors

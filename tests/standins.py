@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from wgsss.methods import make_method
 from wgsss.reference import Estimate, Reference
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import Scene
 from wgsss.stage import Stage

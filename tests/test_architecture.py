@@ -84,14 +84,13 @@ def circles() -> list[list[str]]:
     return found
 
 
-@pytest.mark.xfail(strict=False, reason="registry.py is not there yet")
 def test_the_table_lists_every_module_and_package_once() -> None:
     names = re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| \d+ \| ((?:`\w+` ?)+)\|", TEXT, re.M)))
     assert len(names) == len(set(names))
     assert set(names) == {place_of(module) for module in modules()}
 
 
-@pytest.mark.xfail(strict=False, reason="methods imports reference until registry.py is there")
+@pytest.mark.xfail(strict=False, reason="study imports wgsss for its version")
 def test_no_module_imports_one_of_a_higher_floor() -> None:
     upward = [
         f"{module} (floor {floors()[place_of(module)]}) imports {other} (floor {floors()[place_of(other)]})"

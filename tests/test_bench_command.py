@@ -12,8 +12,7 @@ import pytest
 import trimesh
 
 from wgsss.cli import main
-from wgsss.methods import METHODS
-from wgsss.reference import REFERENCES
+from wgsss.registry import METHODS, REFERENCES
 from wgsss.scene import Scene
 from wgsss.study import bench_run, provenance
 from wgsss.study.bench_run import RunSpec

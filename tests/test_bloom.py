@@ -13,7 +13,7 @@ from wgsss import frame as shared
 from wgsss.cli import main
 from wgsss.errors import InputError
 from wgsss.graph import Graph
-from wgsss.methods import Lambert
+from wgsss.methods.lambert import Lambert
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight
 from wgsss.scene.shapes import sphere

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -24,8 +25,7 @@ from PIL import Image as Picture
 from wgsss.cli import catalogue, main
 from wgsss.errors import Note
 from wgsss.graph import Graph
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
-from wgsss.reference import REFERENCES
+from wgsss.registry import METHODS, REFERENCES, SURFACES, TRANSLUCENCIES
 from wgsss.rendering import AOVS, DEFAULT_METHOD
 from wgsss.scene import MATERIALS
 from wgsss.scene.builtin import SCENES
@@ -85,6 +85,12 @@ def test_references_are_listed_after_the_methods(wgsss: Run) -> None:
     assert [line.split()[0] for line in text.splitlines() if line.endswith(" (a reference)")] == list(REFERENCES)
     listed = json.loads(wgsss("methods", "--json").out)["references"]
     assert [entry["name"] for entry in listed] == list(REFERENCES)
+
+
+def test_a_method_that_is_a_pair_is_listed_with_its_parts(wgsss: Run) -> None:
+    assert re.search(r"^deon07 .* = texture\+tsm$", wgsss("methods").out, re.M)
+    pairs = {method["name"]: method["pair"] for method in json.loads(wgsss("methods", "--json").out)["methods"]}
+    assert (pairs["deon07"], pairs["barre11"], pairs["lambert"]) == ("texture+tsm", "none+thickness", None)
 
 
 def test_surfaces_and_translucencies_are_listed_as_what_pairs_are_made_of(wgsss: Run) -> None:

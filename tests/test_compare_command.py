@@ -9,7 +9,7 @@ import pytest
 from standins import Scaled
 
 from wgsss.cli import main
-from wgsss.reference import REFERENCES
+from wgsss.registry import REFERENCES
 from wgsss.study import compare
 
 

@@ -13,8 +13,7 @@ from conftest import ROOT
 
 from wgsss import __version__
 from wgsss.cli import _parse
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
-from wgsss.reference import REFERENCES
+from wgsss.registry import METHODS, REFERENCES, SURFACES, TRANSLUCENCIES
 from wgsss.scene import load_scene
 
 DOCS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])

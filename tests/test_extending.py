@@ -61,7 +61,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
             line, row = text.splitlines()
             old = target.read_text()
             new = re.sub(r"^from wgsss\.methods\.", f"{line}\n\\g<0>", old, count=1, flags=re.M)
-            new = re.sub(r"^METHODS\b.*\{$", f"\\g<0>\n{row}", new, count=1, flags=re.M)
+            new = re.sub(r"^ROWS = \($", f"\\g<0>\n{row}", new, count=1, flags=re.M)
             assert line in new and row in new
             target.write_text(new)
         else:

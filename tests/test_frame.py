@@ -11,7 +11,7 @@ from scenes import ABOVE, MATTE, WHITE, lit, plane, write_environment
 from wgsss import frame as shared
 from wgsss.bake.environment import rho_dt_table
 from wgsss.graph import Graph
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import AOVS, Renderer
 from wgsss.scene import (
     DirectionalLight,

@@ -23,8 +23,8 @@ from PIL import Image as Picture
 from wgsss.bake.atlas import library
 from wgsss.bake.sam import SELECTIONS
 from wgsss.gpu import Gpu
-from wgsss.methods import METHODS, make_method
 from wgsss.output import save
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import Scene, load_scene
 from wgsss.scene.builtin import SCENES

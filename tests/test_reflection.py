@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import WHITE, lit, write_environment
 
-from wgsss.methods import Lambert
+from wgsss.methods.lambert import Lambert
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, OrthographicCamera
 

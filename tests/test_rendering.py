@@ -12,7 +12,7 @@ import pytest
 from scenes import lit
 
 from wgsss.gpu import TextureKey
-from wgsss.methods import METHODS, make_method
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, load_scene
 

@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 from wgsss.gpu import Gpu
-from wgsss.methods import METHODS
+from wgsss.registry import METHODS
 
 DRIVERS = [Path(folder, "vk_swiftshader_icd.json") for folder in ("/usr/lib/chromium", "/usr/share/vulkan/icd.d")]
 DRIVER = next((path for path in DRIVERS if path.is_file()), None)

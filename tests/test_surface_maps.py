@@ -14,7 +14,7 @@ from wgsss import frame as shared
 from wgsss.bake.samples import Samples
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
-from wgsss.methods import METHODS, make_method
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, Maps, Mesh
 from wgsss.scene.material import WRAPS

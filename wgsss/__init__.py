@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from wgsss.errors import InputError, Note, RenderError
-    from wgsss.methods import METHODS
     from wgsss.output import save
+    from wgsss.registry import METHODS
     from wgsss.rendering import AOVS, Image, Renderer, render
     from wgsss.scene import (
         MATERIALS,
@@ -72,7 +72,7 @@ __all__ = [
 
 _HOMES = {
     "wgsss.errors": {"InputError", "Note", "RenderError"},
-    "wgsss.methods": {"METHODS"},
+    "wgsss.registry": {"METHODS"},
     "wgsss.output": {"save"},
     "wgsss.rendering": {"AOVS", "Image", "Renderer", "render"},
 }

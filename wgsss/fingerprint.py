@@ -57,7 +57,7 @@ def _encoded(value: object, code: set[str]) -> Iterator[bytes]:
             raise TypeError("an array of Python objects has no fingerprint")
         yield repr((np.lib.format.dtype_to_descr(array.dtype), array.shape)).encode()
         yield array.tobytes()
-    elif is_dataclass(value):
+    elif is_dataclass(value) and not isinstance(value, type):
         code.add(kind.__module__)
         counted = [field.name for field in fields(value) if field.metadata.get("fingerprint", True)]
         yield repr(counted).encode()
@@ -77,34 +77,26 @@ def _encoded(value: object, code: set[str]) -> Iterator[bytes]:
         raise TypeError(f"a value of type {kind.__module__}.{kind.__qualname__} has no fingerprint")
 
 
-def closure(
-    modules: Iterable[str], sources: Mapping[str, bytes] | None = None, root: Path = wgsl.ROOT
-) -> dict[str, bytes]:
-    """Return the source of modules and of all modules of this package that they import, by name.
+def closure(modules: Iterable[str]) -> dict[str, bytes]:
+    """Return the source of modules and of everything that they import from this package, by name.
 
     Imports inside of functions count. Where the `__init__.py` of a package only passes a name on, the import leads to
-    the module that defines the name. A string that names a WGSL module adds that module with its imports. Versions of
-    other packages do not count: a key has to hold them where they matter.
-
-    Args:
-        modules: names of modules of this package or of others.
-        sources: the modules of this package; by default as the process found them when it first asked.
-        root: the folder of the WGSL modules.
+    the module that defines the name. A string that is the name of a WGSL module adds that module with its imports.
+    Other packages do not count: where the version of one matters, the key must contain it.
     """
-    sources = _package() if sources is None else sources
     reached, found, shaders = [*modules], dict[str, bytes](), set[str]()
     while reached:
         module = reached.pop()
         if module not in found:
-            found[module] = sources[module] if module in sources else _outside(module)
+            found[module] = _package()[module] if module in _package() else _outside(module)
             imports, strings = _references(found[module])
-            reached += [_home(imported, sources) for imported in imports if imported.module in sources]
-            shaders |= strings & _shaders(root)
+            reached += [_home(imported) for imported in imports if imported.module in _package()]
+            shaders |= strings & _shaders()
     for module in [*found]:  # the packages around it run first
         while module := module.rpartition(".")[0]:
-            if module in sources:
-                found[module] = sources[module]
-    return found | {f"{name}.wgsl": wgsl.load(name, root).source.encode() for name in shaders}
+            if module in _package():
+                found[module] = _package()[module]
+    return found | {f"wgsl/{name}.wgsl": wgsl.load(name, wgsl.ROOT).source.encode() for name in shaders}
 
 
 class _Import(NamedTuple):
@@ -129,21 +121,21 @@ def _references(source: bytes) -> tuple[frozenset[_Import], frozenset[str]]:
     return frozenset(imports), frozenset(strings)
 
 
-def _home(imported: _Import, sources: Mapping[str, bytes]) -> str:
-    """Return the module that defines what is imported."""
+def _home(imported: _Import) -> str:
+    """Return the module that defines what is imported from this package."""
     module, name, _ = imported
     if not name:
         return module
-    if f"{module}.{name}" in sources:
+    if f"{module}.{name}" in _package():
         return f"{module}.{name}"
-    for passed_on in _references(sources[module])[0]:
-        if passed_on.bound == name and passed_on.module in sources and _is_package(module, sources):
-            return _home(passed_on, sources)
+    for passed_on in _references(_package()[module])[0]:
+        if passed_on.bound == name and passed_on.module in _package() and _has_modules(module):
+            return _home(passed_on)
     return module
 
 
-def _is_package(module: str, sources: Mapping[str, bytes]) -> bool:
-    return any(other.startswith(f"{module}.") for other in sources)
+def _has_modules(module: str) -> bool:
+    return any(other.startswith(f"{module}.") for other in _package())
 
 
 @cache
@@ -154,9 +146,9 @@ def _package() -> dict[str, bytes]:
 
 
 @cache
-def _shaders(root: Path) -> frozenset[str]:
-    """Return the names of all WGSL modules in a folder."""
-    return frozenset(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.wgsl"))
+def _shaders() -> frozenset[str]:
+    """Return the names of all WGSL modules."""
+    return frozenset(path.relative_to(wgsl.ROOT).with_suffix("").as_posix() for path in wgsl.ROOT.rglob("*.wgsl"))
 
 
 def _outside(module: str) -> bytes:

@@ -13,7 +13,8 @@ from wgsss import frame as shared
 from wgsss.errors import RenderError, unknown
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph, Handle
-from wgsss.methods import Method, make_method, name_of
+from wgsss.methods import Method
+from wgsss.registry import make_method, name_of
 from wgsss.scene import Scene, checks
 from wgsss.stage import Stage
 from wgsss.text import escaped

@@ -15,7 +15,7 @@ from conftest import ROOT
 SCRIPT = """
 import sys
 from wgsss.gpu import default_gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 from wgsss.stage import Stage

@@ -10,7 +10,7 @@ from scenes import MATTE, WHITE, lit, plane, write_environment
 
 from wgsss.bake.sky import sky_visibility
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, Object, Scene
 from wgsss.scene.mesh import Mesh

@@ -13,7 +13,7 @@ from scenes import MATTE, WHITE, lit, plane, write_environment
 from wgsss.bake.environment import divided, prefilter
 from wgsss.bake.suns import MOST_SUNS, directions, solid_angles, take_suns
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, Object, OrthographicCamera, SphereLight
 from wgsss.scene.shapes import sphere

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from wgsss.gpu import Gpu
-from wgsss.methods import METHODS, make_method
 from wgsss.reference.integral import Integral
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import AOVS, Renderer
 from wgsss.scene import (
     MATERIALS,

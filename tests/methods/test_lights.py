@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from wgsss.gpu import Gpu
-from wgsss.methods import METHODS, make_method
+from wgsss.registry import METHODS, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, Scene, SphereLight, load_scene
 from wgsss.study.light_types import light_types

@@ -13,9 +13,10 @@ from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
-from wgsss.methods import Lambert, make_method, name_of
 from wgsss.methods import local_thickness as module
+from wgsss.methods.lambert import Lambert
 from wgsss.methods.local_thickness import LocalThickness
+from wgsss.registry import make_method, name_of
 from wgsss.rendering import Renderer, render
 from wgsss.scene import (
     MATERIALS,

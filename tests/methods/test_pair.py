@@ -12,10 +12,11 @@ from wgsss.errors import InputError
 from wgsss.frame import Frame
 from wgsss.gpu import Gpu
 from wgsss.graph import Handle
-from wgsss.methods import METHODS, SURFACES, Method, kind_of, make_method, name_of
+from wgsss.methods import Method
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.pair import pair
 from wgsss.methods.texture_space import TextureSpace
+from wgsss.registry import METHODS, SURFACES, kind_of, make_method, name_of
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 from wgsss.stage import Stage

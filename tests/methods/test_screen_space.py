@@ -12,7 +12,7 @@ from scenes import MATTE, lit, plane
 from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.graph import Graph
-from wgsss.methods import Lambert
+from wgsss.methods.lambert import Lambert
 from wgsss.methods.screen_space import ScreenSpace, Taps, taps_for
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.optics.separable import line_spread

@@ -11,7 +11,9 @@ from scipy.stats import norm
 
 from wgsss import frame as shared
 from wgsss.graph import Graph
-from wgsss.methods import Lambert, TextureSpace, texture_space
+from wgsss.methods import texture_space
+from wgsss.methods.lambert import Lambert
+from wgsss.methods.texture_space import TextureSpace
 from wgsss.optics import SKIN_GAUSSIANS, SumOfGaussians
 from wgsss.rendering import Renderer
 from wgsss.scene import MATERIALS, DirectionalLight, EnvironmentLight, Mesh, Object, OrthographicCamera

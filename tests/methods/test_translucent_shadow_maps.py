@@ -11,8 +11,9 @@ from scenes import MATTE, lit, plane
 from scipy.stats import norm
 
 from wgsss.errors import InputError
-from wgsss.methods import make_method, translucent_shadow_maps
+from wgsss.methods import translucent_shadow_maps
 from wgsss.optics import SumOfGaussians
+from wgsss.registry import make_method
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import (
     DirectionalLight,

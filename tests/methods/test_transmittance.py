@@ -11,9 +11,9 @@ from scipy.integrate import trapezoid
 
 from wgsss.frame import begin
 from wgsss.graph import Graph
-from wgsss.methods import make_method
 from wgsss.methods.transmittance import table
 from wgsss.optics import SKIN_GAUSSIANS, Dipole, SumOfGaussians
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     DirectionalLight,

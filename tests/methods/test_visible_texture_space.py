@@ -13,10 +13,11 @@ from scipy.ndimage import minimum_filter
 from wgsss import frame as shared
 from wgsss.errors import InputError
 from wgsss.graph import Graph
-from wgsss.methods import make_method, texture_space
+from wgsss.methods import texture_space
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.visible_texture_space import VisibleTextureSpace, is_closed
 from wgsss.optics import SKIN_GAUSSIANS
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, Mesh, Object, OrthographicCamera, PerspectiveCamera
 from wgsss.scene.shapes import ear, slab, sphere

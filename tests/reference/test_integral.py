@@ -15,13 +15,13 @@ from scipy.ndimage import gaussian_filter
 
 from wgsss.bake.samples import Samples
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
 from wgsss.optics import SKIN_GAUSSIANS, NormalizedDiffusion, Profile, SumOfGaussians
-from wgsss.reference import REFERENCES, convergence, surface_sum
+from wgsss.reference import convergence, surface_sum
 from wgsss.reference import integral as reference
 from wgsss.reference.convergence import Converged, irradiance_at, sum_at_spacing
 from wgsss.reference.integral import Integral, at_vertices, integral
 from wgsss.reference.kernel import BLUR, RADIUS, Kernel, make_kernel
+from wgsss.registry import REFERENCES, make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     DirectionalLight,

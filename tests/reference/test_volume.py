@@ -16,7 +16,6 @@ import pytest
 from tqdm import tqdm
 
 from wgsss.errors import InputError, RenderError
-from wgsss.methods import make_method
 from wgsss.optics import Layer
 from wgsss.reference import mitsuba_paths
 from wgsss.reference.integral import integral
@@ -25,6 +24,7 @@ from wgsss.reference.mitsuba_scene import export
 from wgsss.reference.mitsuba_xml import scene_xml
 from wgsss.reference.photons import trace
 from wgsss.reference.volume import Volume, _rays
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     DirectionalLight,

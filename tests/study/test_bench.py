@@ -14,9 +14,9 @@ import pytest
 from conftest import HAS_FLIP
 
 from wgsss.errors import InputError, Note, RenderError
-from wgsss.methods import METHODS
 from wgsss.methods.lambert import Lambert
-from wgsss.reference import REFERENCES, Estimate, Reference
+from wgsss.reference import Estimate, Reference
+from wgsss.registry import METHODS, REFERENCES
 from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, Scene, load_scene
 from wgsss.stage import Stage

@@ -13,8 +13,7 @@ from scenes import MATTE, lit, plane
 from standins import ERROR, FACTOR, Scaled, Volume, lambert
 
 from wgsss.errors import InputError
-from wgsss.methods import make_method
-from wgsss.reference import REFERENCES
+from wgsss.registry import REFERENCES, make_method
 from wgsss.scene import DirectionalLight, EnvironmentLight, Object, PerspectiveCamera, PointLight, RectLight, Scene
 from wgsss.scene.shapes import sphere
 from wgsss.study import compare as module

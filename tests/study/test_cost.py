@@ -10,7 +10,7 @@ from scenes import lit
 
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight
 from wgsss.study import cost

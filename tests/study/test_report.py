@@ -19,7 +19,7 @@ from standins import Scaled
 
 from wgsss import __version__
 from wgsss.errors import InputError
-from wgsss.reference import REFERENCES
+from wgsss.registry import REFERENCES
 from wgsss.scene import DirectionalLight
 from wgsss.study import compare as module
 from wgsss.study import error_maps, report

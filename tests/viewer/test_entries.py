@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.scene import load_scene
 from wgsss.stage import Stage
 from wgsss.viewer.entries import adjacency, links

@@ -17,7 +17,7 @@ import pytest
 from wgsss import wgsl
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.viewer import controls
 from wgsss.viewer.pace import Pace

@@ -9,7 +9,7 @@ import pytest
 
 from wgsss.bake.thickness import local_thickness
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, Scene, load_scene
 from wgsss.stage import Stage

@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from wgsss.methods import make_method
-from wgsss.reference import REFERENCES
+from wgsss.registry import REFERENCES, make_method
 from wgsss.study.provenance import adapter, scene_digest
 from wgsss.viewer import controls, marks
 from wgsss.viewer.costs import milliseconds

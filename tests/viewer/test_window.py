@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from desk import CUT, DIVIDER, LEFT, RIGHT, SMALL, WINDOW, Desk, desk, missing, pictures, shown
 
-from wgsss.methods import METHODS
+from wgsss.registry import METHODS
 
 METHOD = 60, 186
 """the left side's method in the panel; of what it opens, the first is 25 pixels below, and each 18 below another"""

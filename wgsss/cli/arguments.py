@@ -115,7 +115,7 @@ def load_scene(args: argparse.Namespace, name: str | None = None) -> Scene:
 
 def make_method(args: argparse.Namespace) -> Method:
     """Create the method that the arguments name, with its knobs set."""
-    from wgsss.methods import make_method
+    from wgsss.registry import make_method
 
     parts = args.surface, args.translucency
     if parts == (None, None):

@@ -21,14 +21,14 @@ def scenes(args: Any) -> None:
 
 
 def methods(args: Any) -> None:
-    from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES
-    from wgsss.reference import REFERENCES
+    from wgsss.registry import METHODS, REFERENCES, SURFACES, TRANSLUCENCIES
 
     result = {"methods": _described(METHODS), "references": _described(REFERENCES)}
     rows: list[list[str]] = []
     for kind, entries in result.items():
         for entry in entries:
-            rows.append([entry["name"], entry["source"] + (" (a reference)" if kind == "references" else "")])
+            note = " (a reference)" if kind == "references" else f" = {entry['pair']}" if entry["pair"] else ""
+            rows.append([entry["name"], entry["source"] + note])
             for knob in entry["knobs"]:
                 rows.append(["", f"--set {knob['name']}={_word(knob['default'])}  {knob['help']}, {_values(knob)}"])
     pairs = {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
@@ -54,7 +54,12 @@ def _word(value: Any) -> str:
 
 
 def _described(kinds: Any) -> list[dict[str, Any]]:
-    return [{"name": name, "source": kind.source, "knobs": _knobs(kind)} for name, kind in kinds.items()]
+    from wgsss.registry import pair_of
+
+    return [
+        {"name": name, "source": kind.source, "pair": pair_of(kind), "knobs": _knobs(kind)}
+        for name, kind in kinds.items()
+    ]
 
 
 def _knobs(kind: Any) -> list[dict[str, Any]]:

@@ -30,7 +30,7 @@ def declare(commands: Any) -> None:
 def run(args: Any) -> None:
     from dataclasses import replace
 
-    from wgsss.methods import METHODS, make_method
+    from wgsss.registry import METHODS, make_method
     from wgsss.study import comparison_tables as tables
     from wgsss.study.compare import compare
     from wgsss.study.measurement import make_reference

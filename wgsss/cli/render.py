@@ -41,8 +41,8 @@ def declare(commands: Any) -> None:
 def run(args: Any) -> None:
     from dataclasses import replace
 
-    from wgsss.methods import name_of
     from wgsss.output import check_output, replacing, save, save_frames
+    from wgsss.registry import name_of
     from wgsss.rendering import Renderer
 
     path = check_output(args.output or Path(f"{Path(args.scene).stem}.png"))

@@ -21,7 +21,7 @@ def declare(commands: Any) -> None:
 
 
 def _other(text: str) -> Any:
-    from wgsss.methods import make_method
+    from wgsss.registry import make_method
 
     (name, knobs), *more = arguments.settings(text)
     if more:

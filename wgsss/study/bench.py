@@ -76,8 +76,7 @@ def bench(
 
 def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[RunSpec]:
     """Return what to measure in a scene, each setting once."""
-    from wgsss.methods import METHODS, kind_of, make_method
-    from wgsss.reference import REFERENCES
+    from wgsss.registry import METHODS, REFERENCES, kind_of, make_method
     from wgsss.study.bench_run import RunSpec
     from wgsss.study.measurement import knobs_of
     from wgsss.study.provenance import scene_digest

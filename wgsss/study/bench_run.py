@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from wgsss.errors import InputError, RenderError
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.scene import Scene
 from wgsss.study.measurement import Truth, compute_truth, make_reference, measure
 from wgsss.study.metrics import finite

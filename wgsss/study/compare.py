@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from wgsss.console import progress_bar
 from wgsss.gpu import default_gpu
-from wgsss.methods import METHODS, Method, make_method, name_of
+from wgsss.methods import Method
 from wgsss.reference import Estimate, Reference
+from wgsss.registry import METHODS, make_method, name_of
 from wgsss.rendering import Image
 from wgsss.scene import Scene
 from wgsss.study.measurement import M_of, compute_truth, knobs_of, make_reference, measure

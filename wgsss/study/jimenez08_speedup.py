@@ -22,8 +22,8 @@ import numpy as np
 from wgsss.console import progress_bar
 from wgsss.folders import created_folder
 from wgsss.gpu import default_gpu
-from wgsss.methods import make_method
 from wgsss.output import replacing
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import PerspectiveCamera, Scene
 from wgsss.scene.builtin import crowd

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from wgsss import cache
 from wgsss.errors import unknown
 from wgsss.gpu import default_gpu
-from wgsss.methods import Method, make_method, name_of
-from wgsss.reference import REFERENCES, Estimate, Finished, Reference
+from wgsss.methods import Method
+from wgsss.reference import Estimate, Finished, Reference
+from wgsss.registry import REFERENCES, make_method, name_of
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import Scene
 from wgsss.stage import Stage

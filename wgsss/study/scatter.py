@@ -6,13 +6,13 @@ Three painters draw it: Matplotlib (`chart`), a page (`chart_html`) and the view
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from wgsss.errors import InputError
+from wgsss.registry import colour_of, place_of
 from wgsss.study.run_record import Knob, Run
 
 LEAST_ERROR = 1e-9
@@ -29,12 +29,8 @@ MARGIN = 0.1
 LEAST_MARGIN = 0.05
 """Smallest margin at each end of an axis, in decades."""
 
-# The colours of Okabe and Ito, which people with any colour vision can tell apart.
-_COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 # Shapes for prints without colour: number of corners, 1 for a star, rotation in degrees.
 _SHAPES = ((40, 0, 0), (4, 0, 45), (3, 0, 0), (4, 0, 0), (3, 0, 180), (5, 1, 0), (6, 0, 0), (4, 1, 0), (5, 0, 0))
-# The methods whose place in the lists above is fixed. The place of any other method follows from a hash of its name.
-_PLACES = ("lambert", "deon07", "sam", "jensen02", "jimenez15", "jimenez08", "barre11", "francois06", "oat06")
 
 Box = tuple[float, float, float, float]
 """A rectangle: its least x and y, then its greatest x and y."""
@@ -163,19 +159,12 @@ def ticks(low: float, high: float) -> list[float]:
 
 def style(method: str) -> Style:
     """Return the colour and the shape of a method's points, the same in every chart."""
-    place = _place(method)
-    return Style(_COLOURS[place % len(_COLOURS)], _SHAPES[place % len(_SHAPES)])
+    return Style(colour_of(method), _SHAPES[place_of(method) % len(_SHAPES)])
 
 
 def method_order(method: str) -> tuple[int, str]:
     """Return a key that sorts methods in the same order in every chart."""
-    return _place(method), method
-
-
-def _place(method: str) -> int:
-    if method in _PLACES:
-        return _PLACES.index(method)
-    return len(_PLACES) + zlib.crc32(method.encode("utf-8", "surrogatepass")) % 1000
+    return place_of(method), method
 
 
 def labels(runs: Sequence[Run]) -> list[str]:

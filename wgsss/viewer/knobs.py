@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wgsss.errors import InputError
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, Method, make_method, name_of
-from wgsss.reference import REFERENCES
+from wgsss.methods import Method
+from wgsss.registry import METHODS, REFERENCES, SURFACES, TRANSLUCENCIES, make_method, name_of
 
 if TYPE_CHECKING:
     from wgsss.viewer.window import Window

@@ -8,8 +8,9 @@ from typing import Any
 
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
-from wgsss.methods import Method, name_of
-from wgsss.reference import REFERENCES, Integral
+from wgsss.methods import Method
+from wgsss.reference import Integral
+from wgsss.registry import REFERENCES, name_of
 from wgsss.viewer.measure import Measured, measure
 from wgsss.viewer.pace import STILL_S, Pace
 from wgsss.viewer.pictures import Drawing, Easel, Picture

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from wgsss.methods import name_of
+from wgsss.registry import name_of
 from wgsss.viewer import chart, costs, knobs, lamps, media
 from wgsss.viewer.costs import SIDES
 from wgsss.viewer.pictures import LAYERS

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from wgsss.methods import Method, make_method, name_of
+from wgsss.methods import Method
+from wgsss.registry import make_method, name_of
 from wgsss.scene import Camera, Scene, load_scene
 from wgsss.scene.loading import with_material, with_view
 from wgsss.scene.scenefile import CAMERAS, LIGHTS

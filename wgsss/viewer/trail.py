@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wgsss.errors import InputError
-from wgsss.methods import Method, make_method, name_of
-from wgsss.reference import REFERENCES
+from wgsss.methods import Method
+from wgsss.registry import REFERENCES, make_method, name_of
 from wgsss.study.provenance import adapter, scene_digest
 from wgsss.study.run_log import FILE, read_runs
 from wgsss.study.run_record import Run

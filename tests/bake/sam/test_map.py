@@ -74,10 +74,6 @@ def test_a_map_is_computed_once_for_each_mesh_profile_and_number_of_entries(
     assert calls == [3, 3, 2, 2, 2, 2]
 
 
-def test_the_code_of_every_kind_of_map_is_part_of_its_key() -> None:
-    assert set(module._CODE) == {*SELECTIONS, "full_tree"}
-
-
 @pytest.mark.parametrize(
     ("mesh", "warning"),
     [

@@ -16,12 +16,12 @@ from wgsss.bake.sam.fans import fan_areas
 from wgsss.errors import InputError
 from wgsss.gpu import LIMITS
 from wgsss.graph import Graph
-from wgsss.methods import make_method
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.sam import method as sam
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.reference.integral import at_vertices, pixel_receivers
+from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import (
     MATERIALS,
