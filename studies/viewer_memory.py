@@ -14,12 +14,15 @@ from collections.abc import Iterator
 from itertools import chain, product, repeat
 from pathlib import Path
 
+from rendercanvas.glfw import loop
+
 from wgsss.errors import InputError
 from wgsss.gpu import default_gpu
-from wgsss.registry import METHODS, SURFACES, TRANSLUCENCIES, make_method
-from wgsss.viewer.pace import SCALES
-from wgsss.viewer.state import Source, State
-from wgsss.viewer.window import Window, loop
+from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method
+from wgsss.viewer.command import Source
+from wgsss.viewer.painter import SCALES
+from wgsss.viewer.session import Session
+from wgsss.viewer.window import Window
 
 NAMES = *METHODS, *(f"{surface}+{part}" for surface, part in product(SURFACES, ("none", *TRANSLUCENCIES)))
 TICK_S = 1 / 60
@@ -33,7 +36,8 @@ def resident() -> float:
 
 def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
     """Move the pointer by one step at a time; yield "round" after all methods have been shown."""
-    left, _, across, down = window.region
+    session, painter, layout = window.session, window.session.painter, window.session.layout
+    left, across, down = layout.panel_width, layout.picture_width, layout.picture_height
     number = 0
 
     def move() -> None:
@@ -45,15 +49,15 @@ def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
 
     for first in chain([True], repeat(False)):
         for name in NAMES:
-            window.state.methods[1] = window.state.methods[0]
+            session.methods[1] = session.methods[0]
             try:
-                window.change_method(0, make_method(name))
+                session.set_method(0, make_method(name))
             except InputError:  # the two parts cannot be combined
                 continue
             point(window, "pointer_down", left + 0.25 * across, 0.5 * down)
             for level, scale in enumerate(SCALES if first else ()):
-                while window.painter.scale != scale:
-                    window.painter.pace.step = level
+                while painter.scale != scale:
+                    painter.resolution.step = level
                     move()
                     yield ""
             start = time.perf_counter()
@@ -62,7 +66,7 @@ def hand(window: Window, orbit_s: float, still_s: float) -> Iterator[str]:
                 yield ""
             point(window, "pointer_up", left + 0.25 * across, 0.5 * down)
             start = time.perf_counter()
-            while time.perf_counter() - start < still_s or not window.painter.is_done(window.state, window.full_size):
+            while time.perf_counter() - start < still_s or not painter.is_done(session.view):
                 yield ""
         yield "round"
 
@@ -82,8 +86,8 @@ def main(argv: list[str] | None = None) -> None:
     add("--size", type=int, nargs=2, default=(960, 540), help="size of the window")
     args = parser.parse_args(argv)
 
-    state = State.open(Source(args.scene, vertices=args.vertices), [make_method("lambert"), make_method("lambert")])
-    window = Window(state, default_gpu(), tuple(args.size))
+    source, methods = Source(args.scene, vertices=args.vertices), [make_method("lambert"), make_method("lambert")]
+    window = Window(Session.open(default_gpu(), source, methods), tuple(args.size))
     steps = hand(window, args.orbit, args.still)
     frames: list[str] = []
     rounds: list[tuple[float, float]] = []
@@ -101,10 +105,10 @@ def main(argv: list[str] | None = None) -> None:
         if rounds and now - rounds[0][0] > 60.0 * args.minutes:
             window.canvas.close()
         else:
-            loop().call_later(TICK_S, step)
+            loop.call_later(TICK_S, step)
 
     window.canvas.add_event_handler(lambda event: frames.append(""), "before_draw")
-    loop().call_later(TICK_S, step)
+    loop.call_later(TICK_S, step)
     window.run()
 
 

@@ -1,4 +1,4 @@
-"""What is drawn, when and how finely; and what is left where that fails."""
+"""When the painter draws, at which resolution, and which pictures stay when drawing fails."""
 
 from __future__ import annotations
 
@@ -19,18 +19,16 @@ from wgsss.errors import InputError
 from wgsss.gpu import Gpu
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer
-from wgsss.viewer import controls
-from wgsss.viewer.pace import Pace
-from wgsss.viewer.painter import Painter
+from wgsss.scene import load_scene
+from wgsss.viewer import manipulation
+from wgsss.viewer.painter import AdaptiveResolution, Painter
+from wgsss.viewer.pictures import View
 from wgsss.viewer.reload import Shaders
-from wgsss.viewer.state import Source, State
 
 SIZE = (48, 32)
 
 
-@pytest.fixture
-def state() -> State:
-    return State.open(Source("slab", vertices=300), [make_method("lambert"), make_method("screen+none", {"taps": 9})])
+VIEW = View(load_scene("slab", vertices=300), (make_method("lambert"), make_method("screen+none", {"taps": 9})), SIZE)
 
 
 @pytest.fixture
@@ -38,84 +36,100 @@ def painter(gpu: Gpu) -> Painter:
     return Painter(gpu)
 
 
-def turn(state: State) -> None:
-    state.scene = replace(state.scene, camera=controls.orbit(state.camera, 0.1, 0.05))
+def turned(view: View) -> View:
+    """Return the view from another side."""
+    return replace(view, scene=replace(view.scene, camera=manipulation.orbit(view.scene.camera, 0.1, 0.05)))
 
 
-def right(painter: Painter) -> Any:
+def with_left_method(view: View, name: str) -> View:
+    return replace(view, methods=(make_method(name), view.methods[1]))
+
+
+def right_pixels(painter: Painter) -> Any:
+    """Read back the picture of the right side."""
     assert painter.drawing is not None and painter.sides[1] is not None and painter.sides[1].display is not None
     return painter.drawing.graph.read(painter.sides[1].display)
 
 
-def test_it_is_coarse_while_things_move_and_in_full_once_they_are_still(
-    painter: Painter, state: State, monkeypatch: pytest.MonkeyPatch
+def test_painter_draws_coarsely_while_things_move_and_in_full_afterwards(
+    painter: Painter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 100.0
     monkeypatch.setattr(time, "perf_counter", lambda: now)
-    painter.pace = Pace(budget_s=0.0, step=2)  # and so it stays
-    assert painter.paint(state, SIZE) and painter.scale == 1.0, "the first picture is in full"
-    assert painter.is_done(state, SIZE) and not painter.paint(state, SIZE)
-    turn(state)
-    assert not painter.is_done(state, SIZE)
-    assert painter.paint(state, SIZE) and right(painter).shape[:2] == (8, 12)
-    assert not painter.paint(state, SIZE), "nothing has changed"
+    painter.resolution = AdaptiveResolution(budget_s=0.0, step=2)  # no picture fits the budget
+    assert painter.paint(VIEW) and painter.scale == 1.0, "the first picture is in full"
+    assert painter.is_done(VIEW) and not painter.paint(VIEW)
+    view = turned(VIEW)
+    assert not painter.is_done(view)
+    assert painter.paint(view) and right_pixels(painter).shape[:2] == (8, 12)
+    assert not painter.paint(view), "nothing has changed"
     now += 0.2
-    turn(state)
-    assert painter.paint(state, SIZE) and painter.scale < 1.0
+    view = turned(view)
+    assert painter.paint(view) and painter.scale < 1.0
     now += 0.3
-    assert painter.paint(state, SIZE) and painter.is_done(state, SIZE)
-    wanted = Renderer(state.scene, state.methods[1], SIZE, painter.gpu).frame().display
-    assert right(painter).tobytes() == wanted.tobytes()
+    assert painter.paint(view) and painter.is_done(view)
+    offscreen = Renderer(view.scene, view.methods[1], SIZE, painter.gpu).frame().display
+    assert right_pixels(painter).tobytes() == offscreen.tobytes()
 
 
-def test_what_moved_in_full_is_measured_once_it_is_still(
-    painter: Painter, state: State, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_picture_in_full_is_measured_once_nothing_moves(painter: Painter, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(time, "perf_counter", lambda: now)
-    painter.pace = Pace(budget_s=1e9)
-    painter.paint(state, SIZE)
-    turn(state)
-    assert painter.paint(state, SIZE) and painter.scale == 1.0 and painter.measured is None
-    assert not painter.is_done(state, SIZE)
+    painter.resolution = AdaptiveResolution(budget_s=1e9)
+    painter.paint(VIEW)
+    view = turned(VIEW)
+    assert painter.paint(view) and painter.scale == 1.0 and painter.measurement is None
+    assert not painter.is_done(view)
     now += 0.3
-    assert painter.paint(state, SIZE) and painter.measured is not None and painter.is_done(state, SIZE)
+    assert painter.paint(view) and painter.measurement is not None and painter.is_done(view)
 
 
-def test_the_pool_is_of_what_is_shown(painter: Painter, state: State) -> None:
-    def pooled() -> int:
-        assert painter.paint(state, SIZE)
+def test_side_takes_the_time_of_its_own_passes_and_of_shared_ones(painter: Painter) -> None:
+    assert painter.pass_times(0) == {}, "nothing is drawn yet"
+    painter.paint(VIEW)
+    assert painter.drawing is not None
+    left, right = painter.pass_times(0), painter.pass_times(1)
+    assert left.keys() & right.keys() and left.keys() ^ right.keys()
+    assert painter.frame_ms(0) == sum(left.values()) > 0.0
+    painter.drawing.graph.times.clear()
+    assert painter.frame_ms(0) == 0.0, "passes that were not timed"
+    painter.sides[0] = None
+    assert painter.pass_times(0) == {}, "a reference without an estimate"
+
+
+def test_pool_keeps_only_textures_of_the_present_methods(painter: Painter) -> None:
+    def pooled(view: View) -> int:
+        assert painter.paint(view)
         return sum(map(len, painter.gpu._free.values()))
 
     painter.gpu.trim()
-    few = pooled()
-    state.methods[0] = make_method("texture+none")
-    many = pooled()
+    few = pooled(VIEW)
+    many = pooled(with_left_method(VIEW, "texture+none"))
     assert many > few
-    state.methods[0] = make_method("lambert")
-    assert pooled() < many
+    assert pooled(VIEW) < many
 
 
-def test_what_the_device_holds_does_not_grow_with_frames_and_switches(painter: Painter, state: State) -> None:
-    gpu = painter.gpu
-    painter.pace = Pace(budget_s=1e9)
+def test_device_objects_do_not_accumulate_over_frames_and_methods(painter: Painter) -> None:
+    gpu, view = painter.gpu, VIEW
+    painter.resolution = AdaptiveResolution(budget_s=1e9)
 
-    def held_after_a_round() -> list[int]:
+    def count_after_all_methods() -> list[int]:
+        nonlocal view
         for name in ("texture+none", "screen+none", "lambert"):
-            state.methods[0] = make_method(name)
+            view = with_left_method(view, name)
             for _ in range(3):
-                turn(state)
-                assert painter.paint(state, SIZE)
-        stage = painter.easel.stage(state.scene, state.methods)
+                view = turned(view)
+                assert painter.paint(view)
+        stage = painter.renderer.stage(view.scene, view.methods)
         return [len(x) for x in (gpu._pipelines, gpu._shaders, gpu._views, stage._shared)]
 
-    held_after_a_round()
-    assert held_after_a_round() == held_after_a_round()
+    count_after_all_methods()
+    assert count_after_all_methods() == count_after_all_methods()
 
 
 @pytest.fixture
 def module(painter: Painter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A shader that may be broken."""
+    """Return a shader in a copy of the folder, from which the painter draws."""
     shutil.copytree(wgsl.ROOT, tmp_path / "wgsl")
     monkeypatch.setattr(wgsl.load, "__defaults__", (tmp_path / "wgsl",))
     painter.shaders = Shaders(tmp_path / "wgsl")
@@ -143,39 +157,40 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("fault", BROKEN)
-def test_a_shader_that_breaks_is_said_until_it_is_mended_and_the_last_goes_on(
-    painter: Painter, state: State, module: Path, fault: str
+def test_broken_shader_is_reported_while_the_last_good_one_stays_in_use(
+    painter: Painter, module: Path, fault: str
 ) -> None:
-    good, bad, said = BROKEN[fault]
-    text = module.read_text()
+    good, bad, message = BROKEN[fault]
+    text, view = module.read_text(), VIEW
     assert good in text
-    assert painter.paint(state, SIZE) and not painter.fault
-    before = right(painter).tobytes()
+    assert painter.paint(view) and not painter.error_message
+    before = right_pixels(painter).tobytes()
     save(module, text.replace(good, bad))
-    assert painter.reread()
-    assert not painter.paint(state, SIZE) and re.search(said, painter.fault)
-    assert right(painter).tobytes() == before
-    assert not painter.is_done(state, SIZE), "what is drawn is drawn by the last that was good"
-    assert painter.paint(state, SIZE) and painter.is_done(state, SIZE) and right(painter).tobytes() == before
-    turn(state)
-    assert painter.paint(state, SIZE) and right(painter).tobytes() != before and painter.fault
+    assert painter.reload_shaders()
+    assert not painter.paint(view) and re.search(message, painter.error_message)
+    assert right_pixels(painter).tobytes() == before
+    assert not painter.is_done(view), "it is to be drawn again with the last good shader"
+    assert painter.paint(view) and painter.is_done(view) and right_pixels(painter).tobytes() == before
+    view = turned(view)
+    assert painter.paint(view) and right_pixels(painter).tobytes() != before and painter.error_message
     save(module, text.replace("vec3f(1.0)), sample.a", "vec3f(0.0)) + 0.5, 1.0"))
-    assert painter.reread() and painter.paint(state, SIZE) and not painter.fault
-    assert set(right(painter)[..., :3].flat) <= {187, 188}, "half of white, encoded"
+    assert painter.reload_shaders() and painter.paint(view) and not painter.error_message
+    assert set(right_pixels(painter)[..., :3].flat) <= {187, 188}, "half of white, encoded"
 
 
-def test_what_a_method_cannot_draw_is_said_until_another_is_chosen(
-    painter: Painter, state: State, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_failure_of_a_method_is_reported_until_a_view_can_be_drawn(
+    painter: Painter, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert painter.paint(state, SIZE)
-    before = right(painter).tobytes()
-    lambert = type(state.methods[0])
-    for error, said in ((InputError("not on slabs"), "not on slabs"), (KeyError("slab"), "KeyError('slab')")):
+    view = VIEW
+    assert painter.paint(view)
+    before = right_pixels(painter).tobytes()
+    lambert = type(view.methods[0])
+    for error, message in ((InputError("not on slabs"), "not on slabs"), (KeyError("slab"), "KeyError('slab')")):
         with monkeypatch.context() as patch:
             patch.setattr(lambert, "passes", Mock(side_effect=error))
-            turn(state)
-            assert not painter.paint(state, SIZE)
-        assert painter.fault == said and right(painter).tobytes() == before
-    assert "Traceback" in capsys.readouterr().err, "what nobody foresaw is told in full"
-    turn(state)
-    assert painter.paint(state, SIZE) and not painter.fault
+            view = turned(view)
+            assert not painter.paint(view)
+        assert painter.error_message == message and right_pixels(painter).tobytes() == before
+    assert "Traceback" in capsys.readouterr().err, "an unexpected error is printed with its traceback"
+    view = turned(view)
+    assert painter.paint(view) and not painter.error_message

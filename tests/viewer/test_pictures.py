@@ -1,4 +1,4 @@
-"""Pictures are those of the offscreen command, bit for bit, whatever was shown before."""
+"""The pictures of a scene that changes are bit for bit those of the offscreen renderer."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from wgsss.scene import DirectionalLight, EnvironmentLight, PerspectiveCamera, S
 from wgsss.stage import Stage
 from wgsss.viewer import layers
 from wgsss.viewer.layers import SCENE_LAYERS
-from wgsss.viewer.pictures import LAYERS, Easel
+from wgsss.viewer.pictures import LAYERS, LiveRenderer, View
 
 SIZE = (40, 24)
-METHODS = [make_method("sam", {"samples": 2, "select": "top", "surface": "screen"}), make_method("lambert")]
+METHODS = make_method("sam", {"samples": 2, "select": "top", "surface": "screen"}), make_method("lambert")
 SCENE = load_scene("wave", vertices=600)
 SUN = DirectionalLight((0.3, -1.0, 0.2), (1.0, 2.0, 3.0))
 CHANGES = {
-    "as it is": SCENE,
+    "none": SCENE,
     "camera": replace(SCENE, camera=PerspectiveCamera((60.0, 40.0, 200.0), (0.0, 0.0, 0.0))),
     "sun": replace(SCENE, lights=(SUN, *[x for x in SCENE.lights if isinstance(x, EnvironmentLight)])),
     "sky": replace(SCENE, lights=(EnvironmentLight((3.0, 1.0, 0.5)),)),
@@ -31,22 +31,22 @@ CHANGES = {
 
 
 @pytest.fixture(scope="module")
-def easel(gpu: Gpu) -> Easel:
-    return Easel(gpu)
+def renderer(gpu: Gpu) -> LiveRenderer:
+    return LiveRenderer(gpu)
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_pictures_are_those_of_the_offscreen_command(gpu: Gpu, easel: Easel, change: str) -> None:
+def test_pictures_equal_those_of_the_offscreen_renderer(gpu: Gpu, renderer: LiveRenderer, change: str) -> None:
     scene = CHANGES[change]
-    drawing = easel.draw(scene, METHODS, SIZE, 0.5)
+    drawing = renderer.draw(View(scene, METHODS, SIZE, 0.5))
     for method, picture in zip(METHODS, drawing.pictures, strict=True):
         assert picture.display is not None
-        wanted = Renderer(scene, method, SIZE, gpu).frame(0.5).display
-        assert drawing.graph.read(picture.display).tobytes() == wanted.tobytes()
+        offscreen = Renderer(scene, method, SIZE, gpu).frame(0.5).display
+        assert drawing.graph.read(picture.display).tobytes() == offscreen.tobytes()
 
 
-def test_what_two_methods_share_is_drawn_once(easel: Easel) -> None:
-    drawing = easel.draw(SCENE, METHODS, SIZE)
+def test_passes_that_two_methods_share_run_once(renderer: LiveRenderer) -> None:
+    drawing = renderer.draw(View(SCENE, METHODS, SIZE))
     sam, lambert = drawing.pictures
     names = [item.module.name for item in drawing.graph.ran]
     assert [names.count(f"frame/{name}") for name in ("gbuffer", "irradiance_pixels", "specular")] == [1, 1, 1]
@@ -54,12 +54,12 @@ def test_what_two_methods_share_is_drawn_once(easel: Easel) -> None:
     assert "sam/gather" in sam.passes and "sam/gather" not in lambert.passes
 
 
-def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
+def test_layer_of_a_method_is_tone_mapped_like_radiance(renderer: LiveRenderer) -> None:
     scene = replace(SCENE, tone_map="none")
     for layer in set(LAYERS[1:]) - set(SCENE_LAYERS):
-        drawing = easel.draw(scene, METHODS, SIZE, layer=layer)
+        drawing = renderer.draw(View(scene, METHODS, SIZE, layer=layer))
         sam, lambert = drawing.pictures
-        aov = Renderer(scene, METHODS[0], SIZE, easel.gpu).frame(aovs=[layer]).aovs[layer]
+        aov = Renderer(scene, METHODS[0], SIZE, renderer.gpu).frame(aovs=[layer]).aovs[layer]
         assert sam.display is not None
         linear = np.clip(aov, 0.0, 1.0)
         encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
@@ -67,64 +67,64 @@ def test_a_layer_is_shown_as_if_it_were_light(easel: Easel) -> None:
         assert (lambert.display is None) == (layer == "M_back")
 
 
-def test_layers_of_the_scene_are_the_same_for_all_methods_and_as_coloured(
-    gpu: Gpu, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_layer_of_the_scene_has_its_vertex_colours_for_all_methods(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     colour = np.array([0.2, 0.5, 0.8])
-    monkeypatch.setitem(layers._PAINTED, "thickness", lambda body: np.tile(colour, (len(body.render_mesh.vertex), 1)))
-    drawing = Easel(gpu).draw(load_scene("sphere", vertices=500), METHODS, SIZE, layer="thickness")
+    monkeypatch.setitem(
+        layers._VERTEX_COLOURS, "thickness", lambda body: np.tile(colour, (len(body.render_mesh.vertex), 1))
+    )
+    drawing = LiveRenderer(gpu).draw(View(load_scene("sphere", vertices=500), METHODS, SIZE, layer="thickness"))
     first, second = drawing.pictures
     assert first.display is second.display and first.display is not None
-    shown = drawing.graph.read(first.display)
-    assert (shown[..., 3] > 0).sum() == drawing.seen.sum()
+    pixels, mask = drawing.graph.read(first.display), drawing.object_mask
+    assert (pixels[..., 3] > 0).sum() == mask.sum()
     encoded = 255.0 * (1.055 * colour ** (1 / 2.4) - 0.055)
-    np.testing.assert_allclose(shown[drawing.seen][:, :3], np.tile(encoded, (drawing.seen.sum(), 1)), atol=0.6)
+    np.testing.assert_allclose(pixels[mask][:, :3], np.tile(encoded, (mask.sum(), 1)), atol=0.6)
 
 
-def test_thickness_is_that_of_the_render_vertices(gpu: Gpu) -> None:
+def test_thickness_colours_are_those_of_the_render_vertices(gpu: Gpu) -> None:
     stage = Stage(gpu, load_scene("ear", vertices=1000))
     (body,) = stage.bodies
-    wanted = local_thickness(body.rest.mesh, body.material.profile)
-    assert wanted.max() > 0.1
-    np.testing.assert_array_equal(layers._thickness(body), wanted[body.render_mesh.vertex])
+    colours = local_thickness(body.rest.mesh, body.material.profile)
+    assert colours.max() > 0.1
+    np.testing.assert_array_equal(layers._thickness_colours(body), colours[body.render_mesh.vertex])
 
 
-def test_a_shadow_map_shows_what_the_light_sees(gpu: Gpu) -> None:
-    easel = Easel(gpu)
+def test_shadow_map_shows_the_depth_seen_from_the_light(renderer: LiveRenderer) -> None:
     scene = replace(load_scene("sphere", vertices=500), lights=(SUN,))
-    drawing = easel.draw(scene, METHODS[1:], SIZE, layer="shadow map")
+    drawing = renderer.draw(View(scene, METHODS[1:], SIZE, layer="shadow map"))
     display = drawing.pictures[0].display
     assert display is not None
-    shown = drawing.graph.read(display)
-    lit = shown[..., 3] > 0
-    # The view goes from half a radius to three and a half; the ball is met from one radius on.
-    assert shown[..., 0].max() == pytest.approx(255.0 * (1.055 * (5 / 6) ** (1 / 2.4) - 0.055), abs=1.5)
-    assert shown[lit, 0].min() < 255.0 * (1.055 * 0.53 ** (1 / 2.4) - 0.055), "at the rim, one radius deeper"
-    assert lit.mean() == pytest.approx(np.pi / 4 / 1.02**2, rel=0.03), "a disc that fits"
-    dark = easel.draw(replace(scene, lights=(EnvironmentLight(),)), METHODS[1:], SIZE, layer="shadow map")
+    pixels = drawing.graph.read(display)
+    lit = pixels[..., 3] > 0
+    # The light's view reaches from 0.5 to 3.5 radii, and the sphere begins at 1 radius.
+    assert pixels[..., 0].max() == pytest.approx(255.0 * (1.055 * (5 / 6) ** (1 / 2.4) - 0.055), abs=1.5)
+    assert pixels[lit, 0].min() < 255.0 * (1.055 * 0.53 ** (1 / 2.4) - 0.055), "the rim is one radius deeper"
+    assert lit.mean() == pytest.approx(np.pi / 4 / 1.02**2, rel=0.03), "the disc fills the map"
+    scene = replace(scene, lights=(EnvironmentLight(),))
+    dark = renderer.draw(View(scene, METHODS[1:], SIZE, layer="shadow map"))
     assert dark.pictures[0].display is None
 
 
-def test_the_stretch_of_a_plane_is_even(gpu: Gpu) -> None:
-    drawing = Easel(gpu).draw(load_scene("slab", vertices=300), METHODS[1:], SIZE, layer="UV stretch")
+def test_uv_stretch_of_a_plane_is_uniform(gpu: Gpu) -> None:
+    drawing = LiveRenderer(gpu).draw(View(load_scene("slab", vertices=300), METHODS[1:], SIZE, layer="UV stretch"))
     display = drawing.pictures[0].display
     assert display is not None
-    colours = drawing.graph.read(display)[drawing.seen][:, :3]
+    colours = drawing.graph.read(display)[drawing.object_mask][:, :3]
     middle = np.round(255 * np.array([0.865, 0.865, 0.865]))
-    assert np.abs(colours - middle).max() < 12, "the middle of the map's colours, as 0.865 of each channel"
+    assert np.abs(colours - middle).max() < 12, "the middle of the colour map is 0.865 in each channel"
 
 
-def test_shadows_are_drawn_again_only_where_lights_or_meshes_moved(gpu: Gpu) -> None:
-    easel = Easel(gpu)
+def test_shadow_maps_are_redrawn_only_when_lights_or_meshes_move(gpu: Gpu) -> None:
+    renderer = LiveRenderer(gpu)
     lit = replace(SCENE, lights=(SUN,))
 
-    def shadows(scene: Scene, time_s: float = 0.0, layer: str = "image") -> int:
-        drawing = easel.draw(scene, METHODS[1:], SIZE, time_s, layer)
+    def shadow_passes(scene: Scene, time_s: float = 0.0, layer: str = "image") -> int:
+        drawing = renderer.draw(View(scene, METHODS[1:], SIZE, time_s, layer))
         return sum(item.module.name == "frame/shadow" for item in drawing.graph.ran)
 
-    assert shadows(lit) == 1
-    assert shadows(replace(lit, camera=CHANGES["camera"].camera)) == 0
-    assert shadows(lit, layer="shadow map") == 0
-    assert shadows(replace(lit, lights=(replace(SUN, direction=(0.0, -1.0, 0.0)),))) == 1
-    assert shadows(lit) == 1
-    assert shadows(lit, 0.5) == 1
+    assert shadow_passes(lit) == 1
+    assert shadow_passes(replace(lit, camera=CHANGES["camera"].camera)) == 0
+    assert shadow_passes(lit, layer="shadow map") == 0
+    assert shadow_passes(replace(lit, lights=(replace(SUN, direction=(0.0, -1.0, 0.0)),))) == 1
+    assert shadow_passes(lit) == 1
+    assert shadow_passes(lit, 0.5) == 1

@@ -1,4 +1,4 @@
-"""Shaders are read again when they are saved, and a bad one gives way to the last that was good."""
+"""Shaders are reread when their files change, and a faulty one gives way to the last that worked."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from wgsss import wgsl
 from wgsss.viewer.reload import Shaders
 
-GOOD, BETTER, BAD = "const A: u32 = 1u;\n", "const A: u32 = 2u;\n", "import package::nothing::{B};\n"
+FIRST, SECOND, FAULTY = "const A: u32 = 1u;\n", "const A: u32 = 2u;\n", "import package::nothing::{B};\n"
 
 
 def save(path: Path, text: str, second: int) -> None:
@@ -18,19 +18,19 @@ def save(path: Path, text: str, second: int) -> None:
     os.utime(path, (second, second))
 
 
-def test_a_saved_shader_is_read_again_and_a_bad_one_is_not_kept(tmp_path: Path) -> None:
+def test_changed_shader_is_reread_and_a_faulty_one_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "module.wgsl"
-    save(path, GOOD, 1)
+    save(path, FIRST, 1)
     shaders = Shaders(tmp_path)
-    assert wgsl.load("module", tmp_path).source.strip() == GOOD.strip()
-    assert not shaders.changed()
-    save(path, BETTER, 2)
-    assert shaders.changed() and not shaders.changed()
-    assert wgsl.load("module", tmp_path).source.strip() == BETTER.strip()
-    shaders.keep()
-    save(path, BAD, 3)
-    assert shaders.changed()
+    assert wgsl.load("module", tmp_path).source.strip() == FIRST.strip()
+    assert not shaders.reload_changed()
+    save(path, SECOND, 2)
+    assert shaders.reload_changed() and not shaders.reload_changed()
+    assert wgsl.load("module", tmp_path).source.strip() == SECOND.strip()
+    shaders.mark_working()
+    save(path, FAULTY, 3)
+    assert shaders.reload_changed()
     with pytest.raises(wgsl.WgslError, match="nothing"):
         wgsl.load("module", tmp_path)
-    shaders.undo()
-    assert wgsl.load("module", tmp_path).source.strip() == BETTER.strip()
+    shaders.restore_working()
+    assert wgsl.load("module", tmp_path).source.strip() == SECOND.strip()

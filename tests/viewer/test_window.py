@@ -1,4 +1,4 @@
-"""The window under pointer and keys, on a virtual screen: what it shows is what the offscreen command draws."""
+"""Pointer and keys over the pictures, on a virtual screen: the window shows what the copied command draws."""
 
 from __future__ import annotations
 
@@ -8,12 +8,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from desk import CUT, DIVIDER, LEFT, RIGHT, SMALL, WINDOW, Desk, desk, missing, pictures, shown
+from desk import (
+    CUT,
+    DIVIDER,
+    LEFT,
+    RIGHT,
+    SIZE_OPTION,
+    WINDOW_SIZE,
+    Desk,
+    Pixels,
+    desk,
+    missing,
+    pictures,
+    read_png,
+    right_side,
+)
 
 from wgsss.registry import METHODS
 
-METHOD = 60, 186
-"""the left side's method in the panel; of what it opens, the first is 25 pixels below, and each 18 below another"""
+METHOD_LIST = 60, 186
+"""position of the list of methods for the left side"""
+FIRST_ITEM, ITEM_HEIGHT = 25, 18
+"""pixels from that list to the first item that it opens, and from item to item"""
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"a window needs {missing()}")
 
@@ -22,100 +38,102 @@ pytestmark = pytest.mark.skipif(bool(missing()), reason=f"a window needs {missin
 def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     folder = tmp_path_factory.mktemp("desk")
     argv = ["slab", "--vertices", "300", "--method", "lambert", "--against", "screen+none:taps=9"]
-    with desk(folder, *argv, *SMALL) as opened:
-        opened.settled(lambda pixels: bool(pictures(pixels).any()))
+    with desk(folder, *argv, *SIZE_OPTION) as opened:
+        opened.wait_for_pictures()
         yield opened
 
 
-def test_both_sides_are_what_the_commands_draw(window: Desk) -> None:
-    seen = pictures(window.settled())
-    left, right = window.drawn(LEFT), window.drawn(RIGHT)
-    np.testing.assert_array_equal(seen[:, : CUT - 2], left[:, : CUT - 2])
-    np.testing.assert_array_equal(seen[:, CUT + 2 :], right[:, CUT + 2 :])
+def left_side(screen: Pixels) -> Pixels:
+    """Return the part of the window between panel and divider."""
+    return pictures(screen)[:, : CUT - 2]
+
+
+def test_both_sides_show_what_their_commands_draw(window: Desk) -> None:
+    screen = window.wait_for()
+    left, right = window.render(LEFT), window.render(RIGHT)
+    np.testing.assert_array_equal(left_side(screen), left[:, : CUT - 2])
+    np.testing.assert_array_equal(right_side(screen), right[:, CUT + 2 :])
     assert (left != right).any()
 
 
 @pytest.mark.parametrize(
     ("button", "key"), [(1, ""), (3, ""), (1, "shift"), (1, "ctrl")], ids=["orbit", "pan", "pan by shift", "light"]
 )
-def test_a_drag_moves_what_it_holds_and_the_command_follows(window: Desk, button: int, key: str) -> None:
-    before = pictures(window.settled())
+def test_drag_changes_the_picture_and_its_command(window: Desk, button: int, key: str) -> None:
+    before = pictures(window.wait_for())
     window.drag(RIGHT, (RIGHT[0] + 40, RIGHT[1] + 25), button, key)
-    after = pictures(window.settled(lambda pixels: not np.array_equal(pictures(pixels), before)))
-    wanted = window.drawn(RIGHT)
-    np.testing.assert_array_equal(after[:, CUT + 2 :], wanted[:, CUT + 2 :])
+    after = window.wait_for_change(pictures, before)
+    np.testing.assert_array_equal(right_side(after), window.render(RIGHT)[:, CUT + 2 :])
 
 
-def test_wheel_and_keys_zoom_and_reset(window: Desk) -> None:
-    window.do("mousemove", *RIGHT, "key", "r")
-    start = pictures(window.settled())
-    for act in (("click", 4), ("key", "plus"), ("key", "Left")):
-        before = pictures(window.settled())
-        window.do(*act)
-        window.settled(lambda pixels, before=before: not np.array_equal(pictures(pixels), before))  # type: ignore[misc]
-    window.do("key", "r")
-    window.settled(lambda pixels: bool(np.array_equal(pictures(pixels), start)))
+def test_wheel_and_keys_move_the_camera_and_r_resets_it(window: Desk) -> None:
+    window.xdotool("mousemove", *RIGHT, "key", "r")
+    start = pictures(window.wait_for())
+    for action in (("click", 4), ("key", "plus"), ("key", "Left")):
+        before = pictures(window.wait_for())
+        window.xdotool(*action)
+        window.wait_for_change(pictures, before)
+    window.xdotool("key", "r")
+    window.wait_for_pixels(pictures, start)
 
 
-def test_the_divider_follows_the_pointer(window: Desk) -> None:
-    right = window.drawn(RIGHT)
+def test_divider_follows_the_pointer(window: Desk) -> None:
+    right = window.render(RIGHT)
     window.drag((DIVIDER, 300), (DIVIDER - 100, 300))
     cut = CUT - 100
-    window.settled(lambda pixels: np.array_equal(pictures(pixels)[:, cut + 2 :], right[:, cut + 2 :]))
+    window.wait_for_pixels(lambda screen: pictures(screen)[:, cut + 2 :], right[:, cut + 2 :])
     window.drag((DIVIDER - 100, 300), (DIVIDER, 300))
-    window.settled()
+    window.wait_for()
 
 
-def test_one_side_alone_swapped_and_the_error_between_them(window: Desk) -> None:
-    left, right = window.drawn(LEFT), window.drawn(RIGHT)
-    for key, wanted in (("2", left), ("3", right), ("Tab", left), ("Tab", right), ("x", left), ("x", right)):
-        window.do("mousemove", *RIGHT, "key", key)
-        window.settled(lambda pixels, wanted=wanted: np.array_equal(pictures(pixels), wanted))  # type: ignore[misc]
-    window.do("key", "4")
-    differ = (left.astype(int) != right).any(axis=2)
-    seen = pictures(window.settled(lambda pixels: not np.array_equal(pictures(pixels), right)))
-    rows = slice(0, WINDOW[1] - 60)  # above the legend
-    assert (seen[rows].sum(axis=2) > 60)[differ[rows]].mean() > 0.2, "where they differ it is bright"
-    window.do("key", "1")
+def test_keys_show_one_side_alone_swap_sides_and_show_the_error_map(window: Desk) -> None:
+    left, right = window.render(LEFT), window.render(RIGHT)
+    for key, picture in (("2", left), ("3", right), ("Tab", left), ("Tab", right), ("x", left), ("x", right)):
+        window.xdotool("mousemove", *RIGHT, "key", key)
+        window.wait_for_pixels(pictures, picture)
+    window.xdotool("key", "4")
+    differs = (left.astype(int) != right).any(axis=2)
+    error_map = pictures(window.wait_for_change(pictures, right))
+    rows = slice(0, WINDOW_SIZE[1] - 60)  # above the legend
+    assert (error_map[rows].sum(axis=2) > 60)[differs[rows]].mean() > 0.2, "the map is bright where the sides differ"
+    window.xdotool("key", "1")
 
 
-def test_a_screenshot_is_what_is_shown(window: Desk) -> None:
-    window.do("mousemove", *RIGHT, "key", "3")
-    seen = pictures(window.settled())
-    said = window.output.parent
-    window.do("key", "s")
-    window.settled(lambda _: bool([*said.glob("slab-*.exr")]))
-    (file,) = said.glob("slab-*.png")
-    np.testing.assert_array_equal(seen, shown(file))
-    window.do("key", "1")
+def test_screenshot_equals_the_picture_in_the_window(window: Desk) -> None:
+    window.xdotool("mousemove", *RIGHT, "key", "3")
+    picture = pictures(window.wait_for())
+    folder = window.output.parent
+    window.xdotool("key", "s")
+    window.wait_for(lambda _: bool([*folder.glob("slab-*.exr")]))
+    (file,) = folder.glob("slab-*.png")
+    np.testing.assert_array_equal(picture, read_png(file))
+    window.xdotool("key", "1")
 
 
-def test_a_resize_draws_at_the_new_size(window: Desk) -> None:
-    window.do("windowsize", window.window, 600, 300)
-    window.settled(lambda pixels: not pixels[320:, :].any() or not pixels[:, 620:].any())
-    window.do("windowsize", window.window, *WINDOW)
-    right = window.drawn(RIGHT)
-    cut = CUT + 2
-    window.settled(lambda pixels: np.array_equal(pictures(pixels)[:, cut:], right[:, cut:]))
+def test_resized_window_draws_at_its_new_size(window: Desk) -> None:
+    window.xdotool("windowsize", window.window, 600, 300)
+    window.wait_for(lambda screen: not screen[320:, :].any() or not screen[:, 620:].any())
+    window.xdotool("windowsize", window.window, *WINDOW_SIZE)
+    window.wait_for_pixels(right_side, window.render(RIGHT)[:, CUT + 2 :])
 
 
-def test_a_method_is_chosen_in_the_panel(window: Desk) -> None:
-    before = window.drawn(LEFT)
-    window.do("mousemove", *METHOD, "click", 1)
-    window.settled()
-    window.do("mousemove", METHOD[0], METHOD[1] + 25 + 18 * list(METHODS).index("barre11"), "click", 1)
-    window.settled(lambda screen: not np.array_equal(pictures(screen)[:, : CUT - 2], before[:, : CUT - 2]))
-    command = window.copied(LEFT)
+def test_method_chosen_in_the_panel_is_drawn(window: Desk) -> None:
+    before = window.render(LEFT)[:, : CUT - 2]
+    x, y = METHOD_LIST
+    window.xdotool("mousemove", x, y, "click", 1)
+    window.wait_for()
+    window.xdotool("mousemove", x, y + FIRST_ITEM + ITEM_HEIGHT * list(METHODS).index("barre11"), "click", 1)
+    window.wait_for_change(left_side, before)
+    command = window.copy_command(LEFT)
     assert command[command.index("--method") + 1] == "barre11"
-    chosen = window.drawn(LEFT)
-    window.settled(lambda screen: np.array_equal(pictures(screen)[:, : CUT - 2], chosen[:, : CUT - 2]))
+    window.wait_for_pixels(left_side, window.render(LEFT)[:, : CUT - 2])
 
 
-def test_q_closes_it(tmp_path: Path) -> None:
+def test_q_closes_the_window_and_its_settings_are_saved(tmp_path: Path) -> None:
     with desk(tmp_path, "slab", "--vertices", "300", "--method", "lambert", "--size", "500x300") as opened:
-        opened.settled()
-        opened.do("mousemove", 400, 150, "key", "q")
+        opened.wait_for()
+        opened.xdotool("mousemove", 400, 150, "key", "q")
         assert opened.program.wait(20) == 0
-        assert "rror" not in opened.said()
-    kept = json.loads((tmp_path / "wgsss" / "viewer.json").read_text())
-    assert kept == {"size": [500, 300], "open": ["left", "passes", "right"]}
+        assert "rror" not in opened.printed()
+    settings = json.loads((tmp_path / "wgsss" / "viewer.json").read_text())
+    assert settings == {"size": [500, 300], "open": ["left", "passes", "right"]}

@@ -1,17 +1,22 @@
-"""`wgsss view`: a window to compare two methods by hand."""
+"""`wgsss view`: a window that compares two methods."""
 
 from __future__ import annotations
 
-from typing import Any
+import argparse
+from typing import TYPE_CHECKING, Any
 
 from wgsss.cli import arguments
 from wgsss.errors import InputError
+
+if TYPE_CHECKING:
+    from wgsss.methods import Method
 
 _INSTALL = "pip install rendercanvas glfw imgui-bundle"
 _AGAINST = "method or reference on the right, as in sam:samples=8 (default: lambert)"
 
 
 def declare(commands: Any) -> None:
+    """Declare the command and its arguments."""
     parser = arguments.command(commands, "view", run, "compare two methods in a window")
     arguments.add_scene(parser)
     arguments.add_method(parser)
@@ -20,17 +25,9 @@ def declare(commands: Any) -> None:
     add("--size", metavar="WxH", type=arguments.size, help="size in pixels (default: the last size)")
 
 
-def _other(text: str) -> Any:
-    from wgsss.registry import make_method
-
-    (name, knobs), *more = arguments.settings(text)
-    if more:
-        raise InputError(f"--against {text}: name one method")
-    return make_method(name, knobs)
-
-
-def run(args: Any) -> None:
-    method, other = arguments.make_method(args), _other(args.against)
+def run(args: argparse.Namespace) -> None:
+    """Open the window, and return once it is closed. Raises InputError if it cannot be opened."""
+    methods = [arguments.make_method(args), _parse_against(args.against)]
     try:
         import glfw
         import imgui_bundle  # noqa: F401
@@ -43,9 +40,20 @@ def run(args: Any) -> None:
     from dataclasses import fields
 
     from wgsss.gpu import default_gpu
-    from wgsss.viewer.state import Source, State
+    from wgsss.viewer.command import Source
+    from wgsss.viewer.session import Session
     from wgsss.viewer.window import Window
 
     source = Source(**{field.name: getattr(args, field.name) for field in fields(Source)})
-    state = State.open(source, [method, other], args.material, args.camera, args.light)
-    Window(state, default_gpu(), args.size).run()
+    session = Session.open(default_gpu(), source, methods, args.material, args.camera, args.light)
+    Window(session, args.size).run()
+
+
+def _parse_against(text: str) -> Method:
+    """Return the method of --against, with its knobs set."""
+    from wgsss.methods import make_method
+
+    (name, knobs), *more = arguments.settings(text)
+    if more:
+        raise InputError(f"--against {text}: name one method")
+    return make_method(name, knobs)

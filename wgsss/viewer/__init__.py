@@ -1,1 +1,5 @@
-"""The viewer: a window to compare two methods by hand, on the passes of the offscreen command."""
+"""The viewer: a window that compares two methods, drawn with the same passes as `wgsss render`.
+
+A `Session` holds what is shown and knows no window. Panels, gallery and controls take a session; `Window` puts them
+together.
+"""

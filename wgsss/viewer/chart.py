@@ -1,126 +1,165 @@
-"""Speed against accuracy, live: both sides as dots that move, before all that was measured until now."""
+"""The scatter plot of speed against accuracy: its points, their Pareto front, its axes, and where labels fit."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from wgsss.study.scatter import pareto_front, ticks
-from wgsss.viewer import marks
-from wgsss.viewer.costs import SIDES
-from wgsss.viewer.marks import Mark
+from wgsss.methods import Method
+from wgsss.study.run_record import Run
+from wgsss.study.scatter import LEAST_ERROR, pareto_front, style, ticks
+from wgsss.viewer.history import MeasuredPoint, method_label, run_label
 
-if TYPE_CHECKING:
-    from wgsss.viewer.window import Window
+Colour = tuple[float, float, float, float]
+"""sRGB and opacity, each from 0 to 1"""
 
-HEIGHT = 260
-"""logical pixels"""
-_OFFSETS = ((8, -7), (-8, -7), (0, -21), (0, 7), (8, 5), (-8, 5), (8, -19), (-8, -19))
-"""of labels from their marks, pixels: to the left a label ends there, above and below it is centred"""
-_MOST_TIMES = 5
-"""ticks that have room side by side"""
+OLDEST_OPACITY = 0.35
+"""opacity of the point measured first, where the last has 1"""
+BENCH_OPACITY = 0.4
+SIDE_RADIUS, EARLIER_RADIUS, BENCH_RADIUS = 7.0, 4.0, 3.0
+"""logical pixels: of the methods shown now, of those measured before, and of the runs of a benchmark"""
+_MAX_TIME_TICKS = 5
+"""ticks of the time axis that fit side by side"""
+_LABEL_OFFSETS = ((8, -7), (-8, -7), (0, -21), (0, 7), (8, 5), (-8, 5), (8, -19), (-8, -19))
+"""positions of a label relative to its point that are tried in this order, pixels, y down.
 
-
-def errors(window: Window) -> None:
-    """Declare how far each side is from the reference at this view, and the chart."""
-    from imgui_bundle import imgui
-
-    state, truth, measured = window.state, window.painter.truth, window.painter.measured
-    state.is_measured = imgui.checkbox("measure against the integral", state.is_measured)[1]
-    if truth.fault:
-        imgui.text_wrapped(truth.fault)
-    if measured is not None and any(measured.errors):
-        imgui.text_disabled(f"reference at {truth.share:.3g} of the size")
-        for name, found in zip(SIDES, measured.errors, strict=True):
-            if found is not None and found.rel_rmse:
-                psnr = "" if found.psnr is None else f", {found.psnr:.1f} dB"
-                imgui.text(f"{name}: {100 * found.rel_rmse:.2f} %{psnr}")
-    elif state.is_measured:
-        imgui.text_disabled("refining in the background" if truth.is_refining else "when nothing moves")
-    runs = window.trail.bench(state)
-    session = marks.session(window.trail.points(state, window.full_size), state.methods)
-    if session or runs:
-        _draw(session, marks.bench(runs))
-    if runs:
-        imgui.text_disabled(f"faint: bench, {runs[0]['size'][0]} x {runs[0]['size'][1]} pixels, its own view")
+A label with a positive x starts there, one with a negative x ends there, and one with 0 is centred.
+"""
 
 
-def _draw(session: Sequence[Mark], bench: Sequence[Mark]) -> None:
-    from imgui_bundle import imgui, implot
+@dataclass(frozen=True)
+class ChartPoint:
+    """A point of the scatter plot."""
 
-    flags = implot.Flags_.no_legend | implot.Flags_.no_inputs | implot.Flags_.no_mouse_text
-    if not implot.begin_plot("##errors", (-1, HEIGHT), flags):
-        return
-    every = [*bench, *session]
-    implot.setup_axes("ms a frame", "relative RMSE")
-    for axis, values, unit in (
-        (implot.ImAxis_.x1, [mark.ms for mark in every], ""),
-        (implot.ImAxis_.y1, [mark.error for mark in every], " %"),
-    ):
-        low, high = marks.limits(values)
-        at = ticks(low, high)
-        if not unit and len(at) > _MOST_TIMES:
-            at = [value for value in at if f"{value:e}".startswith("1")]
-        implot.setup_axis_scale(axis, implot.Scale_.log10)
-        implot.setup_axis_limits(axis, low, high, implot.Cond_.always)
-        implot.setup_axis_ticks(axis, at, [f"{value:g}{unit}" for value in at])
-    best = pareto_front([(mark.ms, mark.error) for mark in bench])
-    if best:
-        spec = implot.Spec()
-        spec.line_color = imgui.ImVec4(1.0, 1.0, 1.0, 0.3)
-        implot.plot_line("front", *_steps([bench[i] for i in best]), spec)
-    for i, mark in enumerate(every):
-        spec = implot.Spec()
-        spec.marker, spec.marker_size = implot.Marker_.circle, mark.radius
-        spec.marker_fill_color = spec.marker_line_color = imgui.ImVec4(*mark.colour)
-        implot.plot_scatter(f"##{i}", np.array([mark.ms]), np.array([mark.error]), spec)
-    _write(every[::-1])
-    implot.end_plot()
+    ms: float
+    error: float
+    """relative RMSE, percent"""
+    description: str
+    """shown while the pointer is over the point"""
+    label: str
+    """written beside the point, if there is room; empty: nothing is"""
+    colour: Colour
+    radius: float
+    letter: str = ""
+    """written on the point: the sides that it stands for"""
 
 
-def _steps(best: Sequence[Mark]) -> tuple[Any, Any]:
-    """The best error that each time has reached."""
-    x, y = np.array([mark.ms for mark in best]), np.array([mark.error for mark in best])
+class Box(NamedTuple):
+    """A rectangle on the screen, pixels, y down."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def contains(self, other: Box) -> bool:
+        """Return whether another box lies within this one."""
+        return (
+            self.left <= other.left
+            and other.right <= self.right
+            and self.top <= other.top
+            and other.bottom <= self.bottom
+        )
+
+    def overlaps(self, other: Box) -> bool:
+        """Return whether this box and another have an area in common."""
+        return (
+            self.left < other.right and other.left < self.right and self.top < other.bottom and other.top < self.bottom
+        )
+
+
+def session_points(measured: Sequence[MeasuredPoint], methods: Sequence[Method]) -> list[ChartPoint]:
+    """Return a point for each measured one, those of the two sides' present methods last, and so drawn on top.
+
+    Earlier points fade with their age. `measured` has the oldest first, `methods` those of the left and right side.
+    """
+    labels = [method_label(method) for method in methods]
+    earlier: list[ChartPoint] = []
+    present: list[ChartPoint] = []
+    for age, point in enumerate(reversed(measured)):
+        letter = "".join(side for side, label in zip("LR", labels, strict=True) if label == point.label)
+        opacity = 1.0 if letter else 1.0 - (1.0 - OLDEST_OPACITY) * age / max(len(measured) - 1, 1)
+        radius = (SIDE_RADIUS if letter else EARLIER_RADIUS) * (1.5 if len(letter) > 1 else 1.0)
+        colour = method_colour(point.method, opacity)
+        (present if letter else earlier).append(
+            ChartPoint(point.ms, 100 * point.rel_rmse, point.label, point.label, colour, radius, letter)
+        )
+    return [*reversed(earlier), *present]
+
+
+def bench_points(runs: Sequence[Run]) -> list[ChartPoint]:
+    """Return a point for each run of a benchmark; each method is labelled at its most accurate run."""
+    with_error = (run for run in runs if (run["error"]["rel_rmse"] or 0.0) > LEAST_ERROR)
+    by_error = sorted(with_error, key=lambda run: -(run["error"]["rel_rmse"] or 0.0))
+    most_accurate = {run["method"]: run for run in by_error}
+    return [
+        ChartPoint(
+            run["frame_ms"],
+            100 * (run["error"]["rel_rmse"] or 0.0),
+            run_label(run["method"], run["knobs"]),
+            run["method"] if most_accurate[run["method"]] is run else "",
+            method_colour(run["method"], BENCH_OPACITY),
+            BENCH_RADIUS,
+        )
+        for run in by_error
+    ]
+
+
+def method_colour(method: str, opacity: float) -> Colour:
+    """Return the colour of a method in all charts, with white in place of black."""
+    text = style(method)[0]
+    red, green, blue = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return (red, green, blue, opacity) if red + green + blue > 0 else (1.0, 1.0, 1.0, opacity)
+
+
+def front_steps(points: Sequence[ChartPoint]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return x and y of the steps along the Pareto front: the lowest error (y) that is reached within a time (x)."""
+    best = [points[i] for i in pareto_front([(point.ms, point.error) for point in points])]
+    x, y = np.array([point.ms for point in best]), np.array([point.error for point in best])
     return np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
 
 
-def _write(every: Sequence[Mark]) -> None:
-    """Letters on marks, and beside them labels where they cover no other one and no mark; under a pointer, all of one.
+def axis_limits(values: Sequence[float]) -> tuple[float, float]:
+    """Return limits of a logarithmic axis with a margin around all values; it spans half a decade at least."""
+    low, high = np.log10(min(values)), np.log10(max(values))
+    margin = max(0.1 * (high - low), 0.25 - 0.5 * (high - low), 0.08)
+    return float(10 ** (low - margin)), float(10 ** (high + margin))
 
-    The first have the first choice of places.
+
+def time_ticks(low: float, high: float) -> list[float]:
+    """Return the ticks of the time axis: powers of ten alone if there is no room for more."""
+    values = ticks(low, high)
+    return values if len(values) <= _MAX_TIME_TICKS else [value for value in values if f"{value:e}".startswith("1")]
+
+
+def place_labels(
+    centres: Sequence[tuple[float, float]], radii: Sequence[float], sizes: Sequence[tuple[float, float]], frame: Box
+) -> list[tuple[float, float] | None]:
+    """Choose the left top corner of each label, so that it lies in the frame and covers no point and no other label.
+
+    Args:
+        centres: of the points, pixels. Earlier ones choose first.
+        radii: of the points, pixels.
+        sizes: width and height of the labels, pixels; a label of no width is left out.
+        frame: of the plot.
+
+    Returns:
+        None for a label for which there is no room.
     """
-    from imgui_bundle import imgui, implot
-
-    canvas = implot.get_plot_draw_list()
-    frame = *implot.get_plot_pos(), *(implot.get_plot_pos() + implot.get_plot_size())
-    places = [implot.plot_to_pixels(mark.ms, mark.error) for mark in every]
-    taken = [_box(place.x - m.radius, place.y - m.radius, 2 * m.radius) for place, m in zip(places, every, strict=True)]
-    for place, mark in zip(places, every, strict=True):
-        if implot.is_plot_hovered() and np.hypot(*(imgui.get_mouse_pos() - place)) < mark.radius + 2:
-            imgui.set_tooltip(f"{mark.about}\n{mark.ms:.4g} ms, {mark.error:.3g} %")
-        size = imgui.calc_text_size(mark.letter)
-        canvas.add_text(place - size * 0.5, imgui.IM_COL32(0, 0, 0, 255), mark.letter)
-        width, height = imgui.calc_text_size(mark.label)
-        for dx, dy in _OFFSETS if mark.label else ():
-            box = _box(place.x + dx - width * (0.5 - 0.5 * np.sign(dx)), place.y + dy, width, height)
-            if _inside(box, frame) and not any(_overlap(box, other) for other in taken):
+    taken = [Box(x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)]
+    corners: list[tuple[float, float] | None] = []
+    for (x, y), (width, height) in zip(centres, sizes, strict=True):
+        corner = None
+        for dx, dy in _LABEL_OFFSETS if width else ():
+            left, top = x + dx - width * (0.5 - 0.5 * float(np.sign(dx))), y + dy
+            box = Box(left, top, left + width, top + height)
+            if frame.contains(box) and not any(box.overlaps(other) for other in taken):
                 taken.append(box)
-                red, green, blue, opacity = mark.colour
-                light = 0.5 + 0.5 * red, 0.5 + 0.5 * green, 0.5 + 0.5 * blue, max(opacity, 0.6)
-                canvas.add_text(box[:2], imgui.get_color_u32(light), mark.label)
+                corner = left, top
                 break
-
-
-def _box(x: float, y: float, width: float, height: float | None = None) -> Any:
-    """Left, top, right and bottom."""
-    return x, y, x + width, y + (width if height is None else height)
-
-
-def _inside(box: Any, frame: Any) -> bool:
-    return bool(frame[0] <= box[0] and box[2] <= frame[2] and frame[1] <= box[1] and box[3] <= frame[3])
-
-
-def _overlap(a: Any, b: Any) -> bool:
-    return bool(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
+        corners.append(corner)
+    return corners

@@ -1,152 +1,138 @@
-"""What a pointer does to cameras and lights. Distances on the screen are in heights of the picture, y up."""
+"""Control of a session by pointer and keys."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import replace
-from functools import lru_cache
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wgsss.bake.rays import Caster
-from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Object, OrthographicCamera, Scene
-from wgsss.scene.light import Light
+from wgsss.viewer import manipulation
+from wgsss.viewer.pictures import LAYERS
+from wgsss.viewer.session import COMPARISONS, LEFT, RIGHT, SPLIT, Session
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from rendercanvas.base import BaseRenderCanvas
 
-TURN = 180.0
-"""degrees, across a height"""
-_POLE = np.array([0.0, 1.0, 0.0])
-STEEPEST = 88.0
-"""degrees above and below the horizon that orbits reach"""
+Event = dict[str, Any]
+"""an event of rendercanvas"""
+Action = Callable[[], object]
 
-
-def orbit(camera: Camera, right: float, up: float) -> Camera:
-    """The eye moved round the target, so that what is in front follows the pointer."""
-    arm = np.subtract(camera.eye, camera.target)
-    pole = _unit(np.asarray(camera.up, np.float64))
-    elevation = math.degrees(math.asin(np.clip(arm @ pole / np.linalg.norm(arm), -1.0, 1.0)))
-    higher = float(np.clip(elevation - TURN * up, -STEEPEST, STEEPEST)) - elevation
-    across = _unit(np.cross(pole, arm))
-    arm = _turned(_turned(arm, across, -higher), pole, -TURN * right)
-    return replace(camera, eye=_triple(camera.target + arm))
+DIVIDER, LIGHT, ORBIT, PAN = "divider", "light", "orbit", "pan"
+GRIP_WIDTH = 8
+"""logical pixels on either side of the divider within which a drag moves it"""
+KEY_STEP = 0.03
+"""distance that an arrow key drags the camera, relative to the height of the picture"""
+ZOOM_STEP = 1.1
+"""magnification by a key or by one step of the wheel"""
+_ARROWS = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
 
 
-def pan(camera: Camera, right: float, up: float) -> Camera:
-    """Eye and target moved across the view, so that what is at the target's distance follows the pointer."""
-    view = camera.view()
-    step = -height_at_target(camera) * (right * view[0, :3] + up * view[1, :3])
-    return replace(camera, eye=_triple(camera.eye + step), target=_triple(camera.target + step))
+class Controls:
+    """Changes a session as the events of a canvas ask. Positions are in logical pixels, y down."""
 
+    def __init__(self, session: Session, canvas: BaseRenderCanvas, window_keys: dict[str, Action]) -> None:
+        """`window_keys` are actions by key that concern the window and not the session."""
+        self._session = session
+        self._dragged = ""
+        """DIVIDER, LIGHT, ORBIT or PAN; empty: nothing is dragged"""
+        self._keys = {**self._session_keys(), **window_keys}
+        canvas.add_event_handler(self._on_pointer, "pointer_down", "pointer_move", "pointer_up")
+        canvas.add_event_handler(self._on_wheel, "wheel")
+        canvas.add_event_handler(self._on_double_click, "double_click")
+        canvas.add_event_handler(self._on_key, "key_down")
 
-def zoom(camera: Camera, factor: float) -> Camera:
-    """The picture's middle `factor` times as large."""
-    if isinstance(camera, OrthographicCamera):
-        return replace(camera, height=max(camera.height / factor, 1e-6))
-    arm = np.subtract(camera.eye, camera.target) / factor
-    return replace(camera, eye=_triple(camera.target + arm)) if np.linalg.norm(arm) > 1e-6 else camera
+    def _on_pointer(self, event: Event) -> None:
+        """Start, continue or end a drag."""
+        x, y, kind = event["x"], event["y"], event["event_type"]
+        session = self._session
+        if kind == "pointer_down":
+            self._dragged = self._target(x, event["button"], set(event.get("modifiers", ())))
+        elif kind == "pointer_up":
+            self._dragged = ""
+        elif self._dragged:
+            self._drag(self._dragged, x - session.pointer[0], y - session.pointer[1])
+        session.pointer = x, y
+        session.refresh()
 
+    def _on_wheel(self, event: Event) -> None:
+        self._zoom(ZOOM_STEP ** (-event["dy"] / 100.0))
 
-def focus(camera: Camera, point: Any) -> Camera:
-    """The target at a point, seen from the same side and distance."""
-    step = np.subtract(point, camera.target)
-    return replace(camera, eye=_triple(camera.eye + step), target=_triple(point))
+    def _on_double_click(self, event: Event) -> None:
+        self._focus(event["x"], event["y"])
 
+    def _on_key(self, event: Event) -> None:
+        """Run the action of a key, if it has one."""
+        key, session = event["key"], self._session
+        if key in _ARROWS:
+            x, y = (KEY_STEP * session.layout.picture_height * step for step in _ARROWS[key])
+            self._drag(PAN if "Shift" in event.get("modifiers", ()) else ORBIT, x, y)
+        elif key in self._keys:
+            session.attempt(self._keys[key])
+        session.refresh()
 
-def height_at_target(camera: Camera) -> float:
-    """What the picture spans at the target's distance, mm."""
-    if isinstance(camera, OrthographicCamera):
-        return camera.height
-    distance = float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
-    return 2.0 * distance * math.tan(math.radians(camera.fov) / 2.0)
+    def _target(self, x: float, button: int, modifiers: set[str]) -> str:
+        """Return what a drag that starts at `x` with a button moves."""
+        session, layout = self._session, self._session.layout
+        divider_x = layout.panel_width + session.divider * layout.picture_width
+        if session.comparison == SPLIT and abs(x - divider_x) < GRIP_WIDTH:
+            return DIVIDER
+        if button == 1 and modifiers & {"Control", "Alt"}:
+            return LIGHT
+        return PAN if button != 1 or "Shift" in modifiers else ORBIT
 
+    def _drag(self, target: str, x: float, y: float) -> None:
+        """Move the divider, the first light or the camera by a distance that the pointer moved."""
+        session, layout = self._session, self._session.layout
+        right, up = x / layout.picture_height, -y / layout.picture_height
+        if target == DIVIDER:
+            session.divider = float(np.clip(session.divider + x / layout.picture_width, 0.0, 1.0))
+        elif target == LIGHT:
+            if session.scene.lights:
+                centre = session.scene.bounds.mean(axis=0)
+                light = manipulation.turn_light(session.scene.lights[0], session.camera, right, up, centre)
+                session.set_first_light(light)
+        else:
+            move = manipulation.orbit if target == ORBIT else manipulation.pan
+            session.set_camera(move(session.camera, right, up))
+        session.refresh()
 
-def turn_light(light: Light, camera: Camera, right: float, up: float, centre: Any) -> Light:
-    """A light moved over the sphere of directions about `centre`, as if the pointer turned that sphere."""
-    if isinstance(light, EnvironmentLight):
-        return replace(light, rotation=(light.rotation + TURN * right) % 360.0)
-    across, upright = camera.view()[:2, :3]
-    return _moved(light, centre, lambda v: _turned(_turned(v, upright, TURN * right), across, -TURN * up))
+    def _zoom(self, factor: float) -> None:
+        self._session.set_camera(manipulation.zoom(self._session.camera, factor))
 
+    def _focus(self, x: float, y: float) -> None:
+        """Make the camera look at the point of the surface that is seen at a position of the window."""
+        point = self._session.pick(x, y)
+        if point is not None:
+            self._session.set_camera(manipulation.focus(self._session.camera, point))
 
-def towards(light: Any, centre: Any) -> Array:
-    """The unit vector from `centre` to a light."""
-    arm = np.negative(light.direction) if isinstance(light, DirectionalLight) else np.subtract(light.position, centre)
-    found: Array = arm / (np.linalg.norm(arm) or 1.0)
-    return found
+    def _session_keys(self) -> dict[str, Action]:
+        """Return the actions of all keys but the arrows."""
+        session = self._session
 
+        def compare(comparison: str) -> None:
+            session.comparison = comparison
 
-def bearing(light: Light, centre: Any) -> tuple[float, float]:
-    """Where a light shines from, seen from `centre`, as of `PerspectiveCamera.orbit`: azimuth, elevation, degrees."""
-    x, y, z = towards(light, centre)
-    return math.degrees(math.atan2(x, z)), math.degrees(math.asin(np.clip(y, -1.0, 1.0)))
+        def show_next_layer() -> None:
+            session.layer = LAYERS[(LAYERS.index(session.layer) + 1) % len(LAYERS)]
 
+        def toggle_senders() -> None:
+            session.shows_senders = not session.shows_senders
 
-def aim(light: Light, centre: Any, azimuth: float, elevation: float) -> Light:
-    """A light moved over the sphere about `centre`, as a body, to where it shines from such angles, degrees."""
-    around, above = bearing(light, centre)
-    side = np.array([math.cos(math.radians(around)), 0.0, -math.sin(math.radians(around))])
-    return _moved(light, centre, lambda v: _turned(_turned(v, side, above - elevation), _POLE, azimuth - around))
-
-
-def pick(scene: Scene, aspect: float, right: float, up: float) -> Any:
-    """The nearest point of a still scene's surface, world mm, at -1 to 1 across and up the picture; None: nothing."""
-    camera = scene.camera
-    to_world = np.linalg.inv(camera.projection(aspect, 1.0, 2.0) @ camera.view())
-    near, far = ((to_world @ (right, up, depth, 1.0)) for depth in (0.0, 1.0))
-    start, towards = near[:3] / near[3], _unit(far[:3] / far[3] - near[:3] / near[3])
-    start = start - towards * (
-        float(np.ptp(scene.bounds, axis=0).max()) if isinstance(camera, OrthographicCamera) else 0
-    )
-    distance = min(_distance(thing, start, towards) for thing in scene.objects)
-    return start + distance * towards if math.isfinite(distance) else None
-
-
-def _distance(thing: Object, start: Array, towards: Array) -> float:
-    """From `start` to an object in the direction of the unit vector `towards`; inf where it is missed."""
-    face = _caster(thing).first(start[None], towards[None])[0]
-    if face < 0:
-        return math.inf
-    a, b, c = thing.placed[thing.mesh.faces[face]].astype(np.float64)
-    normal = np.cross(b - a, c - a)
-    return float(normal @ (a - start) / (normal @ towards))
-
-
-@lru_cache(maxsize=32)
-def _caster(thing: Object) -> Caster:
-    return Caster(thing.placed, thing.mesh.faces)
-
-
-def project(camera: Camera, aspect: float, point: Any) -> tuple[float, float]:
-    """Where a point, world mm, is in the picture: -1 to 1 across and up."""
-    clip = camera.projection(aspect, 1.0, 2.0) @ camera.view() @ np.append(point, 1.0)
-    return float(clip[0] / clip[3]), float(clip[1] / clip[3])
-
-
-def _moved(light: Any, centre: Any, turned: Callable[[Array], Array]) -> Any:
-    """A light with all that it has of places and directions turned about `centre`."""
-
-    def vector(value: Any) -> Any:
-        return _triple(turned(np.asarray(value, np.float64)))
-
-    found = {name: vector(getattr(light, name)) for name in ("direction", "up") if hasattr(light, name)}
-    if hasattr(light, "position"):
-        found["position"] = _triple(np.asarray(centre) + vector(np.subtract(light.position, centre)))
-    return replace(light, **found)
-
-
-def _turned(vector: Array, axis: Array, degrees: float) -> Array:
-    """Counter-clockwise seen from the tip of the unit axis (Rodrigues)."""
-    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    return vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1.0 - cos)
-
-
-def _unit(vector: Array) -> Array:
-    return vector / np.linalg.norm(vector)
-
-
-def _triple(vector: Any) -> Any:
-    return tuple(float(x) for x in vector)
+        return {
+            "+": lambda: self._zoom(ZOOM_STEP),
+            "=": lambda: self._zoom(ZOOM_STEP),
+            "-": lambda: self._zoom(1 / ZOOM_STEP),
+            " ": session.play_or_pause,
+            ".": session.step,
+            **{str(i + 1): partial(compare, comparison) for i, comparison in enumerate(COMPARISONS)},
+            "Tab": lambda: compare(LEFT if session.comparison == RIGHT else RIGHT),
+            "x": session.swap_sides,
+            "l": show_next_layer,
+            "e": toggle_senders,
+            "r": session.reset,
+            "f": lambda: self._focus(*session.pointer),
+            "s": session.screenshot,
+            "c": session.copy_command,
+        }

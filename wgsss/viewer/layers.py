@@ -1,4 +1,4 @@
-"""Layers that belong to the scene and to no method: what the atlas does to the surface, thickness, shadow maps."""
+"""Layers that depend on the scene alone and on no method: UV stretch, thickness and the shadow map."""
 
 from __future__ import annotations
 
@@ -18,40 +18,50 @@ from wgsss.stage import Body
 
 Array = npt.NDArray[Any]
 
-_DENSEST = 4.0
-"""times the median number of texels per mm, at the end of the colours"""
+_MAX_DENSITY_RATIO = 4.0
+"""texels per mm over their median, at the red end of the colours of UV stretch"""
 
 
-def _stretch(body: Body) -> Array:
-    """(R, 3) by render vertex: red has more texels per mm than the median, blue fewer."""
+def _stretch_colours(body: Body) -> Array:
+    """Return a linear RGB colour (R, 3) for each render vertex.
+
+    Red means more texels per mm in the atlas than the median of the mesh, blue fewer.
+    """
     import matplotlib
 
     density = np.sqrt(np.abs(np.linalg.det(stretch(body.rest.mesh, body.unwrap()).root)))
-    place = 0.5 + 0.5 * np.log(density / np.median(density)) / np.log(_DENSEST)
+    place = 0.5 + 0.5 * np.log(density / np.median(density)) / np.log(_MAX_DENSITY_RATIO)
     return np.square(matplotlib.colormaps["coolwarm"](np.clip(place, 0.0, 1.0))[:, :3])
 
 
-def _thickness(body: Body) -> Array:
-    """(R, 3) by render vertex: white is thin."""
+def _thickness_colours(body: Body) -> Array:
+    """Return a linear RGB colour (R, 3) for each render vertex: white where the object is thin."""
     return local_thickness(body.rest.mesh, body.material.profile)[body.render_mesh.vertex]
 
 
-_PAINTED: dict[str, Callable[[Body], Array]] = {"UV stretch": _stretch, "thickness": _thickness}
-SCENE_LAYERS = (*_PAINTED, "shadow map")
+_VERTEX_COLOURS: dict[str, Callable[[Body], Array]] = {"UV stretch": _stretch_colours, "thickness": _thickness_colours}
+SCENE_LAYERS = (*_VERTEX_COLOURS, "shadow map")
 
 
 def scene_layer(frame: Frame, layer: str) -> Handle | None:
-    """One of SCENE_LAYERS as a picture, rgba8unorm-srgb; None where there is nothing to show."""
+    """Declare the passes that draw one of SCENE_LAYERS, rgba8unorm-srgb. Return None if the scene has no such layer."""
+    return _shadow_map(frame) if layer == "shadow map" else _draw_vertex_colours(frame, layer)
+
+
+def _shadow_map(frame: Frame) -> Handle | None:
+    if not frame.lighting.views:
+        return None
+    shadow_maps = frame.lighting.shadow_maps
+    display: Handle = frame.graph.draw("viewer/shadow", size=shadow_maps.size[:2], shadow_maps=shadow_maps)
+    return display
+
+
+def _draw_vertex_colours(frame: Frame, layer: str) -> Handle | None:
     graph, stage = frame.graph, frame.stage
-    if layer == "shadow map":
-        if not frame.lighting.views:
-            return None
-        size = frame.lighting.shadow_maps.size[:2]
-        return graph.draw("viewer/shadow", size=size, shadow_maps=frame.lighting.shadow_maps)
     drawn: Any = None
     for body in stage.bodies:
         colors = stage.shared(
-            (layer, id(body.rest.mesh), id(body.material)), partial(_upload, stage.gpu, _PAINTED[layer], body)
+            (layer, id(body.rest.mesh), id(body.material)), partial(_upload, stage.gpu, _VERTEX_COLOURS[layer], body)
         )
         drawn = graph.draw_outputs(
             "viewer/paint",
@@ -67,5 +77,6 @@ def scene_layer(frame: Frame, layer: str) -> Handle | None:
     return None if drawn is None else drawn.display
 
 
-def _upload(gpu: Gpu, colour: Callable[[Body], Array], body: Body) -> Any:
-    return gpu.buffer(np.pad(colour(body), ((0, 0), (0, 1))).astype(np.float32))
+def _upload(gpu: Gpu, colours: Callable[[Body], Array], body: Body) -> Any:
+    """Upload the vertex colours of a body as array<vec4f>."""
+    return gpu.buffer(np.pad(colours(body), ((0, 0), (0, 1))).astype(np.float32))

@@ -1,130 +1,221 @@
-"""What is drawn of the state, when, and how finely: coarsely while things move, in full once they are still."""
+"""When to draw the pictures, at which resolution, and how far they are from a reference."""
 
 from __future__ import annotations
 
 import time
 import traceback
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
+
+import numpy.typing as npt
 
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
-from wgsss.methods import Method
-from wgsss.reference import Integral
-from wgsss.registry import REFERENCES, name_of
-from wgsss.viewer.measure import Measured, measure
-from wgsss.viewer.pace import STILL_S, Pace
-from wgsss.viewer.pictures import Drawing, Easel, Picture
+from wgsss.methods import Method, name_of
+from wgsss.reference import REFERENCES, Integral, Reference
+from wgsss.study.error_maps import coloured
+from wgsss.study.metrics import Errors, error_map, errors
+from wgsss.viewer.pictures import Drawing, LiveRenderer, Picture, View
+from wgsss.viewer.reference import BackgroundReference, EstimateMethod, Request
 from wgsss.viewer.reload import Shaders
-from wgsss.viewer.state import State
-from wgsss.viewer.truth import Known, Truth, View
 from wgsss.wgsl import WgslError
 
+SCALES = (1.0, 0.5, 0.25, 0.125)
+"""resolutions, relative to the sides of the full picture: few, since the textures of each size stay allocated"""
+STILL_S = 0.25
+"""time without a change after which a picture is drawn at full resolution"""
+ERROR_MAP_END = 0.5
+"""error at the end of the colours of the error map, relative to the RMS of the right side's luminance"""
 
-def _is_reference(method: Method) -> bool:
-    return type(method) in REFERENCES.values()
+
+@dataclass
+class AdaptiveResolution:
+    """Chooses a resolution at which a picture takes no longer than `budget_s`.
+
+    It halves the sides when a picture takes longer, and doubles them when four times the time would fit.
+    """
+
+    budget_s: float = 0.1
+    step: int = 0
+    """index into SCALES"""
+
+    @property
+    def scale(self) -> float:
+        return SCALES[self.step]
+
+    def update(self, seconds: float) -> None:
+        """Choose the next resolution, given the time that a picture at the present one took."""
+        if seconds > self.budget_s:
+            self.step = min(self.step + 1, len(SCALES) - 1)
+        elif 4.0 * seconds < 0.8 * self.budget_s:
+            self.step = max(self.step - 1, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Errors of the two sides against the reference, and the error between them."""
+
+    errors: list[Errors | None]
+    """of the left and the right side; None: there is no reference or no picture"""
+    error_map: npt.NDArray[Any] | None
+    """uint8 (H, W, 4), colours of the left side's error relative to the right side; None: a side has no picture"""
+
+
+def measure(drawing: Drawing, sides: Sequence[Picture | None], reference: EstimateMethod | None) -> Measurement | None:
+    """Measure the errors of the two sides. Return None if no pixel shows an object."""
+    mask = drawing.object_mask
+    if not mask.any():
+        return None
+    M = [None if picture is None else drawing.read_M(picture) for picture in sides]
+    side_errors: list[Errors | None] = [None] * len(M)
+    if reference is not None:
+        estimate = reference.estimate
+        side_errors = [None if m is None else errors(m, estimate.M, mask, error=estimate.error) for m in M]
+    left, right = M
+    if left is None or right is None:
+        return Measurement(side_errors, None)
+    return Measurement(side_errors, coloured(error_map(left, right, mask), mask, ERROR_MAP_END))
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What was drawn last: a view, how finely, and with which estimate of a reference."""
+
+    view: View
+    scale: float
+    reference: EstimateMethod | None
+    is_moving: bool
+    """whether things moved: if so, nothing was measured"""
 
 
 class Painter:
-    """Keeps the pictures of both sides as the state has them; where that goes wrong, those that were there."""
+    """Keeps a picture of each side up to date: coarse while things move, at full resolution once they are still.
+
+    If drawing fails, the pictures of the last success stay.
+    """
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
-        self.easel, self.pace, self.shaders = Easel(gpu), Pace(), Shaders()
-        self.truth = Truth()
+        self.renderer, self.resolution, self.shaders = LiveRenderer(gpu), AdaptiveResolution(), Shaders()
+        self.reference = BackgroundReference()
         self.drawing: Drawing | None = None
         self.sides: list[Picture | None] = [None, None]
-        """the pictures of the left and the right side: None is a reference that is not known yet"""
-        self.measured: Measured | None = None
+        """pictures of the left and the right side; None: a reference without an estimate yet"""
+        self.measurement: Measurement | None = None
         self.scale = 1.0
-        """share of the full size that the pictures have"""
-        self.seconds = 0.0
-        """that the last picture took"""
-        self.fault = ""
-        """what keeps the pictures from being those of the state and the shaders as they are"""
-        self.present: list[Method] = []
-        """the methods that the last drawing was asked of"""
-        self._drawn: Any = None
-        """the view that was drawn last, how finely, with which reference, and whether it moved: then nothing was
-        measured"""
-        self._last_known: Known | None = None
+        """resolution of the pictures, relative to their full size"""
+        self.draw_s = 0.0
+        """time that the last drawing took"""
+        self.error_message = ""
+        """why the pictures do not show the latest view or the latest shaders; empty: they do"""
+        self.drawn_methods: tuple[Method, ...] = ()
+        """methods of the last drawing, with estimates in place of references"""
+        self._last: _Drawn | None = None
+        """None: draw again whatever the view is"""
+        self._estimate_method: EstimateMethod | None = None
         self._changed_s = -1.0
-        self._pooled: Any = None
-        """the methods and the size that the device's pool is for"""
+        """when the view last changed"""
+        self._pool_key: tuple[list[str], tuple[int, int]] | None = None
+        """names of methods and size of the pictures that the device's pool of textures serves"""
 
-    def reread(self) -> bool:
-        """Whether shaders have changed: all is drawn anew then."""
-        if not self.shaders.changed():
+    def reload_shaders(self) -> bool:
+        """Return whether a shader file has changed. If so, the next `paint` draws with the new shaders."""
+        if not self.shaders.reload_changed():
             return False
-        self._drawn = None
+        self._last = None
         return True
 
-    def is_done(self, state: State, size: tuple[int, int]) -> bool:
-        """Whether the pictures are of the state as it is, in full."""
-        return self._drawn is not None and (*self._drawn[:2], self._drawn[3]) == (_view(state, size), 1.0, False)
+    def is_done(self, view: View) -> bool:
+        """Return whether the pictures show this view at full resolution."""
+        last = self._last
+        return last is not None and (last.view, last.scale, last.is_moving) == (view, 1.0, False)
 
-    def paint(self, state: State, full: tuple[int, int]) -> bool:
-        """Draw what is not drawn yet, at most at a size in pixels; whether there is something new."""
+    def paint(self, view: View, is_playing: bool = False, is_measured: bool = False) -> bool:
+        """Draw the view, unless it is drawn already. Return whether there are new pictures.
+
+        `is_playing` says that time passes, `is_measured` that errors against a reference are wanted.
+        """
+        now, last = time.perf_counter(), self._last
+        if last is None or view != last.view:
+            self._changed_s = now
+        self._trim_pool(view)
+        is_moving = is_playing or (last is not None and now - self._changed_s < STILL_S)
+        scale = self.resolution.scale if is_moving else 1.0
+        reference = None if is_moving else self._latest_estimate(view, is_measured)
+        if last is not None:
+            if self.is_done(view) and last.reference is reference:
+                return False
+            if is_moving and last.view == view and last.scale >= scale:
+                return False
+        try:
+            self._draw(_Drawn(view, scale, reference, is_moving))
+        except Exception as error:  # a shader that is being edited may break anything
+            self._recover(error)
+            return False
+        self.shaders.mark_working()
+        if not self.shaders.is_outdated:
+            self.error_message = ""
+        self.draw_s = time.perf_counter() - now
+        if is_moving:
+            self.resolution.update(self.draw_s)
+        return True
+
+    def pass_times(self, side: int) -> dict[str, float]:
+        """Return the ms of each pass that drew a side, by pass name; empty if passes were not timed."""
+        picture = self.sides[side]
+        return {} if self.drawing is None or picture is None else self.drawing.pass_times(picture)
+
+    def frame_ms(self, side: int) -> float:
+        """Return the time of all passes that drew a side, including shared ones; 0 if passes were not timed."""
+        return sum(self.pass_times(side).values())
+
+    def _draw(self, drawn: _Drawn) -> None:
+        """Draw and measure the pictures of both sides."""
+        view, scale = drawn.view, drawn.scale
+        size = max(int(view.size[0] * scale), 1), max(int(view.size[1] * scale), 1)
+        methods = [drawn.reference if _is_reference(method) else method for method in view.methods]
+        self.drawn_methods = tuple(method for method in methods if method is not None)
+        self._last = drawn
+        self.drawing = self.renderer.draw(replace(view, methods=self.drawn_methods, size=size), timed=scale == 1.0)
+        self.gpu.fence()
+        pictures = iter(self.drawing.pictures)
+        self.sides = [None if method is None else next(pictures) for method in methods]
+        self.scale = scale
+        self.measurement = None if drawn.is_moving else measure(self.drawing, self.sides, drawn.reference)
+
+    def _recover(self, error: Exception) -> None:
+        """Keep the message of an error, and return to the last shaders that worked."""
         import wgpu
 
-        view, now = _view(state, full), time.perf_counter()
-        last = None if self._drawn is None else self._drawn[0]
-        if view != last:
-            self._changed_s = now
-        pooled = [name_of(method) for method in state.methods], full
-        if pooled != self._pooled:
-            self.gpu.trim()  # or what pictures of all earlier methods and sizes needed would be kept
-            self._pooled = pooled
-        moving = state.playing or (last is not None and now - self._changed_s < STILL_S)
-        scale = self.pace.scale if moving else 1.0
-        known = None if moving else self._known(state, full)
-        if self.is_done(state, full) and self._drawn[2] is known:
-            return False
-        if view == last and moving and self._drawn[1] >= scale:
-            return False
-        size = max(int(full[0] * scale), 1), max(int(full[1] * scale), 1)
-        methods = [known if _is_reference(m) else m for m in state.methods]
-        self.present = [m for m in methods if m is not None]
-        self._drawn = view, scale, known, moving
-        try:
-            self.drawing = self.easel.draw(
-                state.scene, self.present, size, state.time_s, state.layer, timed=scale == 1.0
-            )
-            self.gpu.fence()
-            pictures = iter(self.drawing.pictures)
-            self.sides = [None if m is None else next(pictures) for m in methods]
-            self.scale = scale
-            self.measured = None if moving else measure(self.drawing, self.sides, known)
-        except Exception as error:  # shaders that are being written may break anything
-            if isinstance(error, InputError | RenderError | WgslError | wgpu.GPUError):
-                self.fault = str(error)
-            else:
-                self.fault = repr(error)
-                traceback.print_exc()
-            if self.shaders.undo():
-                self._drawn = None
-            return False
-        self.shaders.keep()
-        if not self.shaders.is_behind:
-            self.fault = ""
-        self.seconds = time.perf_counter() - now
-        if moving:
-            self.pace.took(self.seconds)
-        return True
+        if isinstance(error, InputError | RenderError | WgslError | wgpu.GPUError):
+            self.error_message = str(error)
+        else:
+            self.error_message = repr(error)
+            traceback.print_exception(error)
+        if self.shaders.restore_working():
+            self._last = None
 
-    def _known(self, state: State, size: tuple[int, int]) -> Known | None:
-        """What is known by now of the reference that a side shows, or errors are told against."""
-        references: list[Any] = [m for m in state.methods if _is_reference(m)]
-        if not references and not state.is_measured:
+    def _trim_pool(self, view: View) -> None:
+        """Free the pooled textures when methods or size change; the pool would keep those of all earlier ones."""
+        key = [name_of(method) for method in view.methods], view.size
+        if key != self._pool_key:
+            self.gpu.trim()
+            self._pool_key = key
+
+    def _latest_estimate(self, view: View, is_measured: bool) -> EstimateMethod | None:
+        """Return the best estimate so far of the reference that a side shows, or that errors are measured against."""
+        references = [method for method in view.methods if _is_reference(method)]
+        if not references and not is_measured:
             return None
         reference = references[0] if references else Integral()
-        found = self.truth.of(View(state.scene, state.time_s, size, reference))
-        if found is None:
+        estimate = self.reference.estimate(Request(view.scene, view.time_s, view.size, reference))
+        if estimate is None:
             return None
-        if self._last_known is None or self._last_known.estimate is not found:
-            self._last_known = Known(found)
-        return self._last_known
+        if self._estimate_method is None or self._estimate_method.estimate is not estimate:
+            self._estimate_method = EstimateMethod(estimate)
+        return self._estimate_method
 
 
-def _view(state: State, size: tuple[int, int]) -> Any:
-    """All that the pictures depend on, but for how finely they are drawn and what is known of a reference."""
-    return state.scene, tuple(state.methods), state.layer, state.time_s, size
+def _is_reference(method: Method) -> TypeGuard[Reference]:
+    return type(method) in REFERENCES.values()

@@ -1,4 +1,4 @@
-"""What methods make of one scene, from one graph: they share all passes that are not their own."""
+"""Pictures of one scene by several methods, drawn from one graph: passes that methods share run once."""
 
 from __future__ import annotations
 
@@ -15,24 +15,37 @@ from wgsss.gpu import Gpu
 from wgsss.graph import Graph, Handle
 from wgsss.methods import Method
 from wgsss.rendering import AOVS, draw
-from wgsss.scene import EnvironmentLight, Scene
+from wgsss.scene import EnvironmentLight, Light, Scene
 from wgsss.stage import Stage
 from wgsss.viewer.layers import SCENE_LAYERS, scene_layer
 
 Array = npt.NDArray[Any]
 
 LAYERS = ("image", *(name for name in AOVS if name != "depth"), *SCENE_LAYERS)
-"""what may be shown of a picture"""
+"""what a picture can show"""
+
+
+@dataclass(frozen=True)
+class View:
+    """What to draw: a scene at a time, once by each of several methods."""
+
+    scene: Scene
+    methods: tuple[Method, ...]
+    size: tuple[int, int]
+    """width and height of a picture, pixels"""
+    time_s: float = 0.0
+    layer: str = "image"
+    """one of LAYERS"""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """By one method.
+    """The picture of one method.
 
     Attributes:
-        display: rgba8unorm-srgb, tone mapped, on the device as long as the graph lives; None: black.
-        M: rgba32float, what M is the sum of.
-        passes: names of those that it took, shared ones among them.
+        display: rgba8unorm-srgb, tone mapped; exists on the device as long as its graph. None: black.
+        M: rgba32float images in W/m^2 whose sum is M.
+        passes: names of the passes that the picture needs, including those that it shares with others.
     """
 
     display: Handle | None
@@ -42,37 +55,62 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A frame by several methods: a picture for each; what they are of is at `gbuffer_id`, as of the g-buffer."""
+    """A frame: one picture for each method, and the graph that drew them."""
 
     graph: Graph
     gbuffer_id: Handle
     pictures: list[Picture]
 
     @property
-    def seen(self) -> Array:
-        """bool (H, W): where something is."""
-        found: Array = self.graph.read(self.gbuffer_id)[..., 2] > 0.0
-        return found
+    def object_mask(self) -> Array:
+        """Read back which pixels show an object: bool (H, W)."""
+        mask: Array = self.graph.read(self.gbuffer_id)[..., 2] > 0.0
+        return mask
 
-    def M(self, picture: Picture) -> Array:
-        """float32 (H, W, 3), W/m^2."""
+    def read_M(self, picture: Picture) -> Array:
+        """Read back the M of a picture: float32 (H, W, 3), W/m^2."""
         return np.sum([self.graph.read(handle)[..., :3] for handle in picture.M], axis=0)
 
+    def pass_times(self, picture: Picture) -> dict[str, float]:
+        """Return the ms of each pass of a picture by pass name; without passes that were not timed."""
+        times = self.graph.times
+        return {name: times[name] for name in picture.passes if name in times}
 
-class Easel:
-    """Draws a scene that changes; what persists on the device is made anew only where it must be."""
+
+@dataclass(frozen=True, eq=False)
+class _Shadows:
+    """Shadow maps of an earlier frame.
+
+    Attributes:
+        key: the stage, lights and time that they were drawn for.
+        lighting: the lighting of that frame.
+        graph: the graph that owns the textures; they exist as long as it does.
+    """
+
+    key: tuple[int, tuple[Light, ...], float]
+    lighting: Any
+    graph: Graph
+
+
+class LiveRenderer:
+    """Draws a scene that changes from frame to frame, and reuses what the last frame left on the device.
+
+    Uploaded meshes, baked data and shadow maps are replaced only when the scene changes in a way that affects them.
+    """
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
         self._stage: Stage | None = None
         self._baked: set[Method] = set()
-        self._lighting: tuple[Any, Any, Graph] | None = None
-        """what shadows were drawn for, the lighting with them, and the graph that keeps them"""
+        self._shadows: _Shadows | None = None
 
     def stage(self, scene: Scene, methods: Sequence[Method], time_s: float = 0.0) -> Stage:
-        """The scene, ready for the methods. Bakes, which may take a while the first time."""
+        """Return a stage with the scene posed at a time and baked for the methods.
+
+        The first baking for a mesh and a material may take a while.
+        """
         stage = self._stage
-        if stage is None or not _alike(stage.rest, scene):
+        if stage is None or not _can_share_stage(stage.rest, scene):
             self._stage = stage = Stage(self.gpu, scene, time_s)
             self._baked.clear()
         elif stage.rest is not scene or stage.time_s != time_s:
@@ -84,53 +122,49 @@ class Easel:
         self._baked = set(methods)
         return stage
 
-    def draw(
-        self,
-        scene: Scene,
-        methods: Sequence[Method],
-        size: tuple[int, int],
-        time_s: float = 0.0,
-        layer: str = "image",
-        timed: bool = False,
-    ) -> Drawing:
-        """A picture by each method at a size in pixels, a time in seconds."""
-        stage = self.stage(scene, methods, time_s)
+    def draw(self, view: View, timed: bool = False) -> Drawing:
+        """Draw a picture of the view by each of its methods. If `timed`, measure the time of each pass."""
+        scene = view.scene
+        stage = self.stage(scene, view.methods, view.time_s)
         graph = Graph(self.gpu)
-        shone = id(stage), stage.scene.lights, time_s
-        kept = self._lighting[1] if self._lighting is not None and self._lighting[0] == shone else None
-        frame = shared.begin(graph, stage, size, kept)
-        found = []
-        common = scene_layer(frame, layer) if layer in SCENE_LAYERS else None
-        for drawn in [draw(frame, method) for method in methods]:
+        key = id(stage), stage.scene.lights, view.time_s
+        reused = self._shadows.lighting if self._shadows is not None and self._shadows.key == key else None
+        frame = shared.begin(graph, stage, view.size, reused)
+        shows_scene_layer = view.layer in SCENE_LAYERS
+        common = scene_layer(frame, view.layer) if shows_scene_layer else None
+        pictures = []
+        for drawn in [draw(frame, method) for method in view.methods]:
             display: Handle | None = drawn.display
-            if layer in SCENE_LAYERS:
+            if shows_scene_layer:
                 display = common
-            elif layer != "image":  # as if it were light that is seen
-                light = drawn.layers[layer]
+            elif view.layer != "image":  # tone map the layer as if it were radiance
+                light = drawn.layers[view.layer]
                 display = light and shared.tone_map(graph, light, scene.exposure, scene.tone_map)
             passes = tuple(item.name for item in graph.needed(*([display] if display else []), *drawn.M))
-            found.append(Picture(display, drawn.M, passes))
-        seen = frame.gbuffer.gbuffer_id
-        shadows = frame.lighting.shadow_maps
-        wanted = [seen, *(h for p in found for h in (p.display, *p.M) if h is not None)]
-        wanted += [shadows] if isinstance(shadows, Handle) else []
-        graph.run(*dict.fromkeys(wanted), timed=timed)
-        if isinstance(shadows, Handle):
+            pictures.append(Picture(display, drawn.M, passes))
+        gbuffer_id, shadow_maps = frame.gbuffer.gbuffer_id, frame.lighting.shadow_maps
+        outputs = [gbuffer_id, *(h for p in pictures for h in (p.display, *p.M) if h is not None)]
+        outputs += [shadow_maps] if isinstance(shadow_maps, Handle) else []
+        graph.run(*dict.fromkeys(outputs), timed=timed)
+        if isinstance(shadow_maps, Handle):  # drawn in this frame: keep the texture for the next
             lighting = copy(frame.lighting)
-            lighting.shadow_maps = shadows.resource.gpu
-            self._lighting = shone, lighting, graph
-        return Drawing(graph, seen, found)
+            lighting.shadow_maps = shadow_maps.resource.gpu
+            self._shadows = _Shadows(key, lighting, graph)
+        return Drawing(graph, gbuffer_id, pictures)
 
 
-def _alike(a: Scene, b: Scene) -> bool:
-    """Whether what a stage keeps for one scene serves the other: cameras, and lights other than skies, may differ."""
+def _can_share_stage(a: Scene, b: Scene) -> bool:
+    """Return whether the stage of one scene can be reused for the other.
 
-    def skies(scene: Scene) -> Any:
+    They need the same objects and environment lights; cameras and other lights may differ.
+    """
+
+    def environments(scene: Scene) -> list[EnvironmentLight]:
         return [light for light in scene.lights if isinstance(light, EnvironmentLight)]
 
     return (
         len(a.objects) == len(b.objects)
-        and skies(a) == skies(b)
+        and environments(a) == environments(b)
         and all(
             x.mesh is y.mesh
             and x.material is y.material

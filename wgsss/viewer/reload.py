@@ -1,4 +1,4 @@
-"""Shaders are read again when their files change; what does not compile gives way to what did."""
+"""Reloading of shaders whose files change. While a new version fails, the last version that worked stays in use."""
 
 from __future__ import annotations
 
@@ -9,40 +9,41 @@ from wgsss import wgsl
 
 
 class Shaders:
-    """The WGSL modules that are in use."""
+    """Watches the WGSL files below a folder, and remembers the last loaded modules that worked."""
 
     def __init__(self, root: Path = wgsl.ROOT) -> None:
         self._root = root
-        self._seen = self._times()
-        self._good = dict(wgsl.loaded)
-        self.is_behind = False
-        """whether what is in use is not what is in the files, which was bad"""
+        self._times = self._read_times()
+        self._working = dict(wgsl.loaded)
+        self.is_outdated = False
+        """whether the modules in use are older than the files, because the files contain an error"""
 
-    def _times(self) -> dict[str, int]:
+    def _read_times(self) -> dict[str, int]:
+        """Return the modification time of each WGSL file, ns."""
         times = {}
         for path in self._root.rglob("*.wgsl"):
-            with suppress(FileNotFoundError):  # editors may replace a file as it is saved
+            with suppress(FileNotFoundError):  # an editor may replace a file while it saves
                 times[str(path)] = path.stat().st_mtime_ns
         return times
 
-    def changed(self) -> bool:
-        """Whether a file has changed since it was asked last; if so, all are read anew."""
-        times = self._times()
-        if times == self._seen:
+    def reload_changed(self) -> bool:
+        """Return whether a file has changed since the last call. If so, unload all modules, so that they are reread."""
+        times = self._read_times()
+        if times == self._times:
             return False
-        self._seen = times
-        self.is_behind = False
+        self._times = times
+        self.is_outdated = False
         wgsl.loaded.clear()
         return True
 
-    def keep(self) -> None:
-        """What is in use is good."""
-        self._good.update(wgsl.loaded)
+    def mark_working(self) -> None:
+        """Remember the modules in use as the last ones that worked."""
+        self._working.update(wgsl.loaded)
 
-    def undo(self) -> bool:
-        """Go back to what was good; whether that is something else."""
-        bad = dict(wgsl.loaded)
-        wgsl.loaded.update(self._good)
-        changed = wgsl.loaded != bad
-        self.is_behind |= changed
-        return changed
+    def restore_working(self) -> bool:
+        """Put the last modules that worked back into use. Return whether any of them differs from those in use."""
+        failed = dict(wgsl.loaded)
+        wgsl.loaded.update(self._working)
+        is_changed = wgsl.loaded != failed
+        self.is_outdated |= is_changed
+        return is_changed

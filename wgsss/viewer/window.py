@@ -1,209 +1,152 @@
-"""The window: what happens when, what is where, and what keys, buttons and dropped files ask for."""
+"""The window: puts session, controls, panel and pictures together, and decides when to draw a frame."""
 
 from __future__ import annotations
 
+import json
 import time
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wgsss import console
-from wgsss.errors import InputError, RenderError
-from wgsss.gpu import Gpu
-from wgsss.methods import Method
-from wgsss.viewer import keys, memory
+import glfw
+import wgpu
+from platformdirs import user_state_path
+from rendercanvas.glfw import RenderCanvas, loop
+
+from wgsss.errors import RenderError
+from wgsss.viewer.controls import Controls
 from wgsss.viewer.gallery import Gallery
-from wgsss.viewer.painter import Painter
-from wgsss.viewer.panels import OPEN, PANEL_WIDTH, panels
-from wgsss.viewer.pointer import Pointer
-from wgsss.viewer.state import LEFT, RIGHT, Source, State
-from wgsss.viewer.trail import Trail
+from wgsss.viewer.layout import Layout
+from wgsss.viewer.panels.panel import OPEN_HEADINGS, Panel
+from wgsss.viewer.session import Session
+from wgsss.viewer.ui import Ui
 
-SIZE = 960, 540
-"""of the window, logical pixels, the first time"""
-POLL_S = 0.2
-"""between looks at how far a reference is"""
-WATCH_S = 0.5
-"""between looks at the shaders' files"""
-AGAIN_S = 0.1
-"""until a frame is drawn again that the screen did not take"""
-LONGEST_S = 0.5
-"""of time that a frame may take: what is played does not skip what was not shown"""
-
-
-def loop() -> Any:
-    """The loop that windows live in."""
-    from rendercanvas.glfw import loop
-
-    return loop
+DEFAULT_SIZE = 960, 540
+"""of the window, logical pixels"""
+REFERENCE_POLL_S = 0.2
+"""time between looks for a better estimate of a reference"""
+SHADER_POLL_S = 0.5
+"""time between looks for changed shaders"""
+RETRY_S = 0.1
+"""time until the next frame after one that could not be shown"""
+MAX_TIME_STEP_S = 0.5
+"""longest step of the animation from frame to frame: it does not skip the time that one slow frame takes"""
 
 
 class Window:
-    """A window on a state. Drawn when something has changed, and while something moves."""
+    """A window on a session. It draws a frame when something has changed, and while something moves."""
 
-    def __init__(self, state: State, gpu: Gpu, size: tuple[int, int] | None = None) -> None:
-        """`size` in logical pixels: by default what it was the last time."""
-        import glfw
-        from rendercanvas.glfw import RenderCanvas
-
-        from wgsss.viewer.ui import Ui
-
-        self.state, self.gpu = state, gpu
-        self.painter, self.trail = Painter(gpu), Trail()
-        remembered = memory.recall()
-        self.open_panels = set(remembered.get("open", OPEN))
-        self._size: tuple[float, float] = SIZE
-        self._clock: float | None = None
-        """when the last frame of what is played was drawn"""
-        self._is_lost = False
-        size = size or tuple(remembered.get("size", SIZE))
-        self.canvas = RenderCanvas(size=size, title=f"wgsss: {state.source.scene}", update_mode="ondemand")
-        self.ui = Ui(gpu.device, self.canvas, self._declare, lambda: self.region[0])
-        self.gallery = Gallery(gpu, self.ui.backend)
-        self.pointer = Pointer(self)
-        self.canvas.add_event_handler(partial(keys.press, self), "key_down")
-        on_drop: Any = lambda window, paths: self.drop(paths)  # noqa: E731
+    def __init__(self, session: Session, size: tuple[int, int] | None = None) -> None:
+        """`size` is in logical pixels. None: the size of the window that was closed last."""
+        self.session, self._gpu = session, session.painter.gpu
+        settings = _load_settings()
+        self._frame_s: float | None = None
+        """when the last frame of an animation that plays was drawn"""
+        self._is_device_lost = False
+        size = size or tuple(settings.get("size", DEFAULT_SIZE))
+        self.canvas = RenderCanvas(size=size, title=self._title, update_mode="ondemand")
+        self.canvas.add_event_handler(lambda event: self._update_layout(), "resize", order=-200)
+        self._update_layout()
+        session.refresh, session.copy_text = self.canvas.request_draw, self._copy_text
+        self._ui = Ui(self._gpu, self.canvas, self._declare, lambda: session.layout.panel_width)
+        self._gallery = Gallery(session, self._gpu, self._ui.backend)
+        self._panel = Panel(session, settings.get("open", OPEN_HEADINGS))
+        Controls(session, self.canvas, {"p": self._ui.take_keyboard, "q": self.canvas.close})
+        on_drop: Any = self._on_drop  # glfw declares other parameters than it passes
         glfw.set_drop_callback(self.canvas._window, on_drop)
         self.canvas.request_draw(self._draw)
 
     def run(self) -> None:
-        """Until the window is closed. Raises RenderError where the device is lost."""
-        self._watch()
+        """Show the window until it is closed. Raises RenderError if the device is lost."""
+        self._poll_shaders()
         try:
-            loop().run()
+            loop.run()
         finally:
-            self.painter.truth.close()
-        memory.remember({"size": self._size, "open": sorted(self.open_panels)})
-        if self._is_lost:
-            raise RenderError(f"{self.gpu.name}: the device was lost; start the viewer again")
+            self.session.painter.reference.close()
+        layout = self.session.layout
+        _save_settings({"size": [layout.width, layout.height], "open": sorted(self._panel.open_headings)})
+        if self._is_device_lost:
+            raise RenderError(f"{self._gpu.name}: the device was lost; start the viewer again")
 
-    def _watch(self) -> None:
-        """Look after the shaders, again and again."""
-        if self.painter.reread():
-            self.refresh()
-        loop().call_later(WATCH_S, self._watch)
+    @property
+    def _title(self) -> str:
+        return f"wgsss: {self.session.source.scene}"
 
-    def refresh(self) -> None:
-        """Draw again soon."""
-        self.canvas.request_draw()
+    def _update_layout(self) -> None:
+        width, height = self.canvas.get_logical_size()
+        self.session.layout = Layout(width, height, self.canvas.get_pixel_ratio())
+
+    def _poll_shaders(self) -> None:
+        """Draw again if a shader has changed, and look again later."""
+        if self.session.painter.reload_shaders():
+            self.session.refresh()
+        loop.call_later(SHADER_POLL_S, self._poll_shaders)
 
     def _draw(self) -> None:
-        state, now = self.state, time.perf_counter()
-        if state.playing and self._clock is not None:
-            state.time_s += min(now - self._clock, LONGEST_S)
-        self._clock = now if state.playing else None
-        self._size = self.canvas.get_logical_size()
-        if self.painter.paint(state, self.full_size):
-            self.gallery.hang(self.painter)
-            self.trail.follow(state, self.painter, self.full_size)
+        """Draw a frame, and request the next one if the pictures are not final."""
+        session, now = self.session, time.perf_counter()
+        self._update_layout()
+        if session.is_playing and self._frame_s is not None:
+            session.time_s += min(now - self._frame_s, MAX_TIME_STEP_S)
+        self._frame_s = now if session.is_playing else None
+        if session.paint():
+            self._gallery.update_textures()
         self._present()
-        if state.playing or not self.painter.is_done(state, self.full_size):
-            self.refresh()
-        elif self.painter.truth.is_refining:
-            loop().call_later(POLL_S, self.refresh)
+        if session.is_playing or not session.painter.is_done(session.view):
+            session.refresh()
+        elif session.painter.reference.is_refining:
+            loop.call_later(REFERENCE_POLL_S, session.refresh)
 
     def _present(self) -> None:
-        """Show pictures and panel. Raises what wgpu does where the surface is lost: it is there again the next time."""
-        import wgpu
+        """Draw the user interface on the screen.
 
+        Raises the error of wgpu if the window's surface is lost; the next frame recreates it. If the device is lost,
+        close the window.
+        """
         try:
-            self.gpu.fence()  # says that the device is lost, where asking a surface for a texture would end the process
-            self.ui.render()
+            self._gpu.fence()  # raises if the device is lost; asking a surface for a texture then would end the process
+            self._ui.render()
         except wgpu.GPUError as error:
             if "device is lost" in str(error):
-                self._is_lost = True
-                loop().call_soon(self.canvas.close)
+                self._is_device_lost = True
+                loop.call_soon(self.canvas.close)
                 raise wgpu.DrawCancelled from None
-            loop().call_later(AGAIN_S, self.refresh)
+            loop.call_later(RETRY_S, self.session.refresh)
             raise
 
     def _declare(self) -> None:
-        self.gallery.declare(self)
-        panels(self)
+        """Declare the content of a frame for Dear ImGui."""
+        self._gallery.declare()
+        self._panel.declare()
 
-    # what is where, in logical pixels
-
-    @property
-    def region(self) -> tuple[float, float, float, float]:
-        """Left, top, width and height of where pictures are."""
-        width, height = self.canvas.get_logical_size()
-        left = min(PANEL_WIDTH, 0.5 * width)
-        return left, 0.0, max(width - left, 1.0), max(height, 1.0)
-
-    @property
-    def full_size(self) -> tuple[int, int]:
-        """Of a picture, in pixels of the screen."""
-        _, _, width, height = self.region
-        ratio = self.canvas.get_pixel_ratio()
-        return max(int(width * ratio), 1), max(int(height * ratio), 1)
-
-    @property
-    def side(self) -> int:
-        """Which picture keys are about: the one shown, or under the pointer."""
-        if self.state.comparison in (LEFT, RIGHT):
-            return (LEFT, RIGHT).index(self.state.comparison)
-        left, _, across, _ = self.region
-        return int((self.pointer.at[0] - left) / across > self.state.divider)
-
-    # what keys, buttons and dropped files ask for
-
-    def attempt(self, act: Any) -> None:
-        """Do something that bad input may keep from being done; say so."""
-        try:
-            act()
-        except InputError as error:
-            self.state.note(str(error))
-        self.refresh()
-
-    def drop(self, paths: list[str]) -> None:
-        """Open a scene or a mesh, or wear a material, from files dropped on the window."""
+    def _on_drop(self, window: object, paths: list[str]) -> None:
+        """Open files that were dropped on the window, one after the other."""
         for path in paths:
-            self.attempt(partial(self._take, path))
+            self.session.attempt(partial(self.session.open_file, path))
+        self.canvas.set_title(self._title)
 
-    def _take(self, path: str) -> None:
-        """A scene where it is one, else a material."""
-        try:
-            self.open(Source(path))
-        except InputError:
-            if Path(path).suffix.lower() != ".toml":
-                raise
-            self.state.wear(path)
-
-    def open(self, source: Source) -> None:
-        """Show another scene. Raises InputError for what is wrong with it."""
-        opened = State.open(source, self.state.methods)
-        self.state = replace(
-            self.state, source=source, opened=opened.opened, scene=opened.scene, material=None, time_s=0.0
-        )
-        self.canvas.set_title(f"wgsss: {source.scene}")
-
-    def change_method(self, side: int, method: Method) -> None:
-        self.state.methods[side] = method
-        self.refresh()
-
-    def screenshot(self, side: int | None = None) -> list[Path]:
-        """Write what is shown of a side, by default the one that keys are about, PNG and EXR, as the command would."""
-        from wgsss.output import save
-        from wgsss.rendering import AOVS, Renderer
-
-        state = self.state
-        method = state.methods[self.side if side is None else side]
-        image = Renderer(state.scene, method, self.full_size, self.gpu).frame(state.time_s, AOVS)
-        stem = f"{Path(state.source.scene).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
-        files = [path for suffix in (".png", ".exr") for path in save(image, Path(stem + suffix))]
-        state.note(f"wrote {', '.join(map(str, files))}")
-        return files
-
-    def copy_command(self, side: int | None = None) -> str:
-        """Put the command that draws a side, by default the one that keys are about, on the clipboard."""
-        import glfw
-
-        command = self.state.command(self.side if side is None else side, self.full_size)
+    def _copy_text(self, text: str) -> None:
+        """Put a text on the clipboard, unless the system has none."""
         with suppress(glfw.GLFWError):
-            glfw.set_clipboard_string(self.canvas._window, command)
-        with suppress(InputError, BrokenPipeError):
-            console.print_result(f"copied: {command}")
-        self.state.note(f"copied: {command}")
-        return command
+            glfw.set_clipboard_string(self.canvas._window, text)
+
+
+def _settings_file() -> Path:
+    return user_state_path("wgsss") / "viewer.json"
+
+
+def _load_settings() -> dict[str, Any]:
+    """Return the `size` and `open` headings of the last window; an empty table if the file is missing or damaged."""
+    with suppress(OSError, ValueError):
+        settings = json.loads(_settings_file().read_text())
+        if isinstance(settings, dict):
+            return settings
+    return {}
+
+
+def _save_settings(settings: dict[str, Any]) -> None:
+    """Write the settings for the next window, unless the folder cannot be written."""
+    with suppress(OSError):
+        _settings_file().parent.mkdir(parents=True, exist_ok=True)
+        _settings_file().write_text(json.dumps(settings))

@@ -1,0 +1,1 @@
+"""The panel beside the pictures: Dear ImGui controls that read and change a `Session`."""
