@@ -18,7 +18,7 @@ def atomic_folder(folder: Path) -> Iterator[Path]:
     Other files in `folder` stay. Raises InputError if `folder` cannot be written, before the block runs if possible.
     """
     target = _resolved(folder)
-    with _naming_path(folder):
+    with naming_path(folder):
         if target.exists() and not target.is_dir():
             raise InputError(f"{folder}: this is not a folder")
         if not target.parent.is_dir():
@@ -53,7 +53,7 @@ def created_folder(folder: Path) -> Iterator[None]:
     target = _resolved(folder)
     missing: list[Path] = []
     try:
-        with _naming_path(folder):
+        with naming_path(folder):
             if target.exists() and not target.is_dir():
                 raise InputError(f"{folder}: this is not a folder")
             missing += (path for path in (target, *target.parents) if not path.exists())
@@ -66,12 +66,12 @@ def created_folder(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _naming_path(folder: Path) -> Iterator[None]:
-    """Turn an OSError in the block into an InputError that names the folder."""
+def naming_path(path: Path) -> Iterator[None]:
+    """Turn an OSError in the block into an InputError that names a file or folder."""
     try:
         yield
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def _resolved(folder: Path) -> Path:

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from wgsss import __version__
 from wgsss.errors import InputError, RenderError
+from wgsss.folders import naming_path
 
 if TYPE_CHECKING:
     from wgsss.rendering import Image
@@ -43,8 +44,8 @@ def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
     path = Path(path)
     if path.suffix.lower() not in formats:
         raise InputError(f"{path}: the file extension must be {' or '.join(formats)}")
-    with _naming_path(path):
-        _check_target(path)
+    with naming_path(path):
+        _check_place(path)
         if not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder '{path.parent}'")
         trial = _temporary(path)  # permissions alone do not decide whether a file can be written
@@ -63,7 +64,7 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     """
     temporary = [_temporary(path) for path in paths]
     try:
-        with _naming_path(paths[0]):
+        with naming_path(paths[0]):
             for path in paths:
                 _check_target(path)
             yield temporary
@@ -83,15 +84,6 @@ def _check_target(path: Path) -> None:
 def _temporary(path: Path) -> Path:
     """Return a short temporary name that is unique to this process, also for names of the greatest allowed length."""
     return path.with_name(f".{zlib.crc32(os.fsencode(path.name)):08x}.{os.getpid()}{path.suffix}")
-
-
-@contextmanager
-def _naming_path(path: Path) -> Iterator[None]:
-    """Turn an OSError in the block into an InputError that names the path."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def save(image: Image, path: str | Path) -> list[Path]:
