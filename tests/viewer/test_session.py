@@ -1,4 +1,4 @@
-"""The actions of a session, and the command that draws what it shows."""
+"""The actions of a session, and the command that draws the same picture."""
 
 from __future__ import annotations
 

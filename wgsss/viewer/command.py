@@ -1,4 +1,4 @@
-"""The command line that draws what the viewer shows."""
+"""The command line that draws a picture of the viewer."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from wgsss.scene import Camera, Light, Scene, load_scene
 from wgsss.scene.scenefile import CAMERAS, LIGHTS
 from wgsss.scene.tables import Table
 from wgsss.viewer.pictures import View
+
+KnobValue = bool | int | float | str
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,9 @@ def render_command(source: Source, opened: Scene, material: str | Table | None, 
 
     Args:
         source: names the scene.
-        opened: the scene as it was loaded; the command states what the view changes of it.
-        material: what replaces all materials; None: nothing does.
-        view: what is shown.
+        opened: the scene as it was loaded; the command states how the view differs from it.
+        material: replaces the materials of all objects; None: they stay.
+        view: the view that the viewer shows.
         side: index of the method.
     """
     scene, method = view.scene, view.methods[side]
@@ -77,10 +79,15 @@ def render_command(source: Source, opened: Scene, material: str | Table | None, 
     return shlex.join([*words, "--size", f"{view.size[0]}x{view.size[1]}"])
 
 
-def changed_knobs(method: Method) -> dict[str, Any]:
-    """Return the knobs of a method that are not at their defaults, with their values."""
-    default = vars(make_method(name_of(method)))
-    return {knob: value for knob, value in vars(method).items() if value != default[knob]}
+def knob_values(method: Method) -> dict[str, KnobValue]:
+    """Return the values of all knobs of a method by name."""
+    return {f.name: getattr(method, f.name) for f in fields(method)}  # type: ignore[arg-type]
+
+
+def changed_knobs(method: Method) -> dict[str, KnobValue]:
+    """Return the values of the knobs of a method that are not at their defaults, by name."""
+    default = knob_values(make_method(name_of(method)))
+    return {knob: value for knob, value in knob_values(method).items() if value != default[knob]}
 
 
 def toml(value: Any) -> str:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from rendercanvas.base import BaseRenderCanvas
 
 from wgsss.viewer import manipulation
 from wgsss.viewer.pictures import LAYERS
 from wgsss.viewer.session import COMPARISONS, LEFT, RIGHT, SPLIT, Session
+from wgsss.viewer.ui import Event
 
-if TYPE_CHECKING:
-    from rendercanvas.base import BaseRenderCanvas
-
-Event = dict[str, Any]
-"""an event of rendercanvas"""
 Action = Callable[[], object]
 
 DIVIDER, LIGHT, ORBIT, PAN = "divider", "light", "orbit", "pan"
@@ -73,7 +69,7 @@ class Controls:
         session.refresh()
 
     def _target(self, x: float, button: int, modifiers: set[str]) -> str:
-        """Return what a drag that starts at `x` with a button moves."""
+        """Return the target of a drag that starts at `x` with a button: DIVIDER, LIGHT, ORBIT or PAN."""
         session, layout = self._session, self._session.layout
         divider_x = layout.panel_width + session.divider * layout.picture_width
         if session.comparison == SPLIT and abs(x - divider_x) < GRIP_WIDTH:

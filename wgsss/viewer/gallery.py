@@ -1,13 +1,13 @@
-"""The pictures beside the panel: side by side, one alone, or the error map, and what is drawn over them."""
+"""The pictures beside the panel: side by side, one alone, or the error map, with lines and texts over them."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy.typing as npt
 from imgui_bundle import imgui
+from wgpu.utils.imgui import ImguiWgpuBackend
 
 from wgsss.gpu import Gpu
 from wgsss.study import error_maps
@@ -30,11 +30,11 @@ SENDER, VERTEX = imgui.IM_COL32(90, 220, 255, 255), imgui.IM_COL32(255, 200, 60,
 class Gallery:
     """Shows the pictures of a session behind the panel."""
 
-    def __init__(self, session: Session, gpu: Gpu, backend: Any) -> None:
-        """`backend` is that of wgpu's renderer for Dear ImGui."""
+    def __init__(self, session: Session, gpu: Gpu, backend: ImguiWgpuBackend) -> None:
         self._session = session
         self._sides = UiTexture(gpu, backend), UiTexture(gpu, backend)
         self._error_map, self._colour_bar = UiTexture(gpu, backend), UiTexture(gpu, backend)
+        self._colour_bar.write(error_maps.colour_bar())
         fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
         self._mono = backend.io.fonts.add_font_from_file_ttf(str(fonts / "DejaVuSansMono.ttf"), FONT_SIZE)
 
@@ -74,19 +74,17 @@ class Gallery:
     def _declare_picture(self, canvas: imgui.ImDrawList, texture: UiTexture, start: float, end: float) -> None:
         """Show a texture from `start` to `end`, shares of its width, where that part of the picture belongs."""
         layout = self._session.layout
-        if texture.reference is not None and end > start:
+        if end > start:
             left, width = layout.panel_width, layout.picture_width
             corners = (left + start * width, 0.0), (left + end * width, layout.picture_height)
-            canvas.add_image(texture.reference, *corners, (start, 0.0), (end, 1.0))
+            texture.draw(canvas, corners, ((start, 0.0), (end, 1.0)))
 
     def _declare_legend(self, canvas: imgui.ImDrawList) -> None:
         """Show the colours of the error map with a scale."""
         layout = self._session.layout
-        if self._colour_bar.reference is None:
-            self._colour_bar.write(error_maps.colour_bar())
         x, y = layout.panel_width + 0.2 * layout.picture_width, layout.picture_height - 40.0
         length = 0.6 * layout.picture_width
-        canvas.add_image(self._colour_bar.reference, (x, y), (x + length, y + 10))
+        self._colour_bar.draw(canvas, ((x, y), (x + length, y + 10)))
         for place, text in error_maps.ticks(ERROR_MAP_END):
             canvas.add_text((x + place * length - 8, y + 14), WHITE, text)
 

@@ -1,11 +1,10 @@
-"""What has been measured of a scene: by the viewer since the scene was opened, and by `wgsss bench` before."""
+"""Measurements of a scene: by the viewer since the scene was opened, and by `wgsss bench` before."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from wgsss.errors import InputError
 from wgsss.methods import Method, name_of
@@ -16,7 +15,7 @@ from wgsss.study.provenance import adapter, scene_digest
 from wgsss.study.run_log import FILE, read_runs
 from wgsss.study.run_record import Run
 from wgsss.study.scatter import panels
-from wgsss.viewer.command import changed_knobs
+from wgsss.viewer.command import KnobValue, changed_knobs
 from wgsss.viewer.pictures import View
 
 BENCH_FOLDER = Path("bench")
@@ -60,7 +59,7 @@ class History:
             del self._points[key]
 
     def points(self, view: View) -> list[MeasuredPoint]:
-        """Return the points measured for what a view shows, whatever its methods, the oldest first."""
+        """Return the points measured for a view, by any method, the oldest first."""
         return [point for (key, _), point in self._points.items() if key == _key(view)]
 
     def bench_runs(self, opened: Scene, scene: Scene) -> list[Run]:
@@ -82,7 +81,7 @@ def method_label(method: Method) -> str:
     return run_label(name_of(method), changed_knobs(method))
 
 
-def run_label(method: str, knobs: dict[str, Any]) -> str:
+def run_label(method: str, knobs: Mapping[str, KnobValue]) -> str:
     """Return the name of a method followed by its knobs and their values."""
     return ", ".join([method, *(f"{k} {f'{v:.4g}' if isinstance(v, float) else v}" for k, v in knobs.items())])
 

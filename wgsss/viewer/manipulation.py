@@ -1,4 +1,4 @@
-"""Moves of cameras and lights that follow a dragged pointer, and what is under it.
+"""Cameras and lights that follow a dragged pointer, and the point of the scene under the pointer.
 
 `right` and `up` are distances that the pointer moved, relative to the height of the picture.
 """

@@ -1,4 +1,4 @@
-"""When to draw the pictures, at which resolution, and how far they are from a reference."""
+"""Decides when to draw the pictures and at which resolution, and measures their errors."""
 
 from __future__ import annotations
 

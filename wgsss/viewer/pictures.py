@@ -22,7 +22,7 @@ from wgsss.viewer.layers import SCENE_LAYERS, scene_layer
 Array = npt.NDArray[Any]
 
 LAYERS = ("image", *(name for name in AOVS if name != "depth"), *SCENE_LAYERS)
-"""what a picture can show"""
+"""the images that a picture can show"""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class _Shadows:
 
 
 class LiveRenderer:
-    """Draws a scene that changes from frame to frame, and reuses what the last frame left on the device.
+    """Draws a scene that changes from frame to frame, and reuses data on the device from the last frame.
 
     Uploaded meshes, baked data and shadow maps are replaced only when the scene changes in a way that affects them.
     """

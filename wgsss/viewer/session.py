@@ -1,4 +1,4 @@
-"""A session of the viewer: what it shows, and the actions that change it. It knows no window."""
+"""The state of the viewer and the actions that change it. It knows no window."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MAX_NOTES = 8
 
 @dataclass
 class Session:
-    """What the viewer shows, and what draws and measures it.
+    """The state of the viewer, with the painter that draws it and the history of its measurements.
 
     The window provides `layout`, `pointer` and the two callbacks.
     """
@@ -51,7 +51,7 @@ class Session:
     scene: Scene
     """the scene as it is shown, with changed camera, lights and materials"""
     material: str | Table | None = None
-    """what replaces the materials of all objects; None: nothing does"""
+    """replaces the materials of all objects; None: they stay"""
     comparison: str = SPLIT
     """one of COMPARISONS"""
     divider: float = 0.5
@@ -119,7 +119,7 @@ class Session:
         return manipulation.pick(self.scene.at(self.time_s), self.layout.aspect, right, up)
 
     def paint(self) -> bool:
-        """Draw what has changed, and record what was measured. Return whether there are new pictures."""
+        """Draw the pictures if the view has changed, and record their errors. Return whether there are new pictures."""
         if not self.painter.paint(self.view, self.is_playing, self.is_measured):
             return False
         measurement = self.painter.measurement

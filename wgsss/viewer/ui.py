@@ -14,17 +14,18 @@ import numpy.typing as npt
 import wgpu
 from imgui_bundle import imgui, implot
 from rendercanvas.glfw import RenderCanvas, loop
-from wgpu.utils.imgui import ImguiRenderer
+from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
 
 from wgsss.gpu import Gpu
 
 Event = dict[str, Any]
 """an event of rendercanvas"""
+Point = tuple[float, float]
 
 FONT_SIZE = 14.0
 """logical pixels"""
 FRAMES_PER_INPUT = 3
-"""frames to draw after an input: Dear ImGui takes up a press, its release and what they open in successive frames"""
+"""frames to draw after an input: Dear ImGui handles a press, its release and a popup that they open one by one"""
 HOVER_S = 0.6
 """time after the last input at which one more frame is drawn: the tooltip of the control under the pointer appears"""
 
@@ -175,12 +176,11 @@ class UiTexture:
     Its format is not sRGB: the user interface shows the encoded values as they are, and sampling must not decode them.
     """
 
-    def __init__(self, gpu: Gpu, backend: Any) -> None:
-        """`backend` is that of wgpu's renderer for Dear ImGui."""
+    def __init__(self, gpu: Gpu, backend: ImguiWgpuBackend) -> None:
         self._gpu, self._backend = gpu, backend
         self._texture: wgpu.GPUTexture | None = None
-        self.reference: Any = None
-        """what Dear ImGui calls the texture; None: there is none"""
+        self._handle: imgui.ImTextureRef | None = None
+        """by which Dear ImGui refers to the texture"""
 
     def copy(self, source: wgpu.GPUTexture) -> None:
         """Copy an rgba8unorm-srgb texture."""
@@ -196,12 +196,22 @@ class UiTexture:
         layout = {"bytes_per_row": 4 * width, "rows_per_image": height}
         self._gpu.queue.write_texture({"texture": texture}, np.ascontiguousarray(pixels), layout, (width, height, 1))
 
+    def draw(
+        self, canvas: imgui.ImDrawList, corners: tuple[Point, Point], uv: tuple[Point, Point] = ((0.0, 0.0), (1.0, 1.0))
+    ) -> None:
+        """Draw the texture, or the part of it between two points of its own, between two corners on a canvas.
+
+        Draw nothing if there is no texture.
+        """
+        if self._handle is not None:
+            canvas.add_image(self._handle, *corners, *uv)
+
     def clear(self) -> None:
         """Destroy the texture; the user interface shows nothing then."""
         if self._texture is not None:
-            self._backend.unregister_texture(self.reference)
+            self._backend.unregister_texture(self._handle)
             self._texture.destroy()
-        self._texture = self.reference = None
+        self._texture = self._handle = None
 
     def _allocate(self, size: tuple[int, int]) -> wgpu.GPUTexture:
         """Return a texture of a size; the present one if it fits."""
@@ -209,5 +219,5 @@ class UiTexture:
             self.clear()
             usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
             self._texture = self._gpu.device.create_texture(size=(*size, 1), format="rgba8unorm", usage=usage)
-            self.reference = self._backend.register_texture(self._texture.create_view())
+            self._handle = self._backend.register_texture(self._texture.create_view())
         return self._texture

@@ -12,11 +12,11 @@ from imgui_bundle import imgui
 from wgsss.errors import InputError
 from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, Method, make_method, name_of
 from wgsss.reference import REFERENCES
+from wgsss.viewer.command import KnobValue, knob_values
 from wgsss.viewer.panels.widgets import CLAMPED, LOGARITHMIC, choice, rounded
 from wgsss.viewer.session import Session
 
 Knob = Field[Any]
-KnobValue = bool | int | float | str
 
 DOUBLING_RANGE = 300
 """largest value of a whole number from which on its buttons double and halve it; otherwise they add and subtract 1"""
@@ -47,11 +47,11 @@ def with_knob(method: Method, knob: Knob, value: KnobValue) -> Method:
     If the method refuses a whole number, such as an even one, take the next in the direction of the change. Raises
     InputError if both are refused.
     """
-    name, values = name_of(method), dict(vars(method))
+    name, values = name_of(method), knob_values(method)
     if type(value) is not int:
         return make_method(name, values | {knob.name: value})
     low, high = knob.metadata["range"]
-    candidates = range(value, high + 1) if value > values[knob.name] else range(value, low - 1, -1)
+    candidates = range(value, high + 1) if value > getattr(method, knob.name) else range(value, low - 1, -1)
     error = InputError(f"{knob.name} must lie between {low} and {high}, not {value}")
     for candidate in candidates[:2]:
         try:
@@ -83,6 +83,6 @@ def _declare_knob(knob: Knob, value: Any) -> Any:
 
 
 def _declare_help(knob: Knob) -> None:
-    """Declare a tooltip for the control above: what the knob does, and its unit."""
+    """Declare a tooltip for the control above, with the help text and the unit of its knob."""
     unit = knob.metadata["unit"]
     imgui.set_item_tooltip(f"{knob.metadata['help']}{f', {unit}' if unit else ''}".replace("%", "%%"))

@@ -1,7 +1,4 @@
-"""The panel: what stands above its headings, the headings, and what is below them.
-
-Methods, knobs, materials and lights are listed from the packages that define them.
-"""
+"""The whole panel: the controls of the comparison, and a section below each heading."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ LABEL_WIDTH = 110
 NOTES_HEIGHT = 92
 """logical pixels"""
 KEY_WIDTH = 130
-"""logical pixels to the left of the text that says what a key does"""
+"""width of the column of keys in the list of KEYS, logical pixels"""
 KEYS = (
     ("drag, arrows", "orbit"),
     ("shift or right drag", "pan (shift arrows)"),
@@ -100,7 +97,7 @@ def _begin(name: str, width: float, top: float, height: float) -> None:
 
 
 def _declare_comparison(session: Session) -> None:
-    """Declare what is shown of the two sides, and how bright."""
+    """Declare the choice of comparison and layer, the divider, exposure and bloom."""
     session.comparison = choice("show", session.comparison, COMPARISONS)
     session.layer = choice("layer", session.layer, LAYERS)
     if session.comparison == SPLIT:
@@ -129,7 +126,7 @@ def _declare_time(session: Session) -> None:
 
 
 def _declare_keys(session: Session) -> None:
-    """Declare a list of what keys and pointer do."""
+    """Declare the list of keys and their actions."""
     for key, action in KEYS:
         imgui.text(key)
         imgui.same_line(KEY_WIDTH)
