@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from wgsss.methods import make_method
+from wgsss.study.scatter import is_free
 from wgsss.viewer import chart
-from wgsss.viewer.chart import Box, ChartPoint
+from wgsss.viewer.chart import ChartPoint
 from wgsss.viewer.history import MeasuredPoint
 
 
@@ -51,11 +52,14 @@ def test_axis_holds_all_values_and_spans_half_a_decade_at_least() -> None:
 
 
 def test_labels_cover_no_point_and_no_other_label() -> None:
-    frame = Box(0.0, 0.0, 100.0, 60.0)
-    centres, size = [(20.0, 30.0), (24.0, 30.0), (60.0, 5.0), (50.0, 50.0)], (30.0, 12.0)
-    corners = chart.place_labels(centres, [4.0] * 4, [size, size, (90.0, 12.0), (0.0, 12.0)], frame)
-    points = [Box(x - 4.0, y - 4.0, x + 4.0, y + 4.0) for x, y in centres]
-    boxes = [Box(x, y, x + size[0], y + size[1]) for x, y in (corner for corner in corners if corner is not None)]
-    assert len(boxes) == 2 and corners[2:] == [None, None], "one is too wide, and one is empty"
-    assert all(frame.contains(box) for box in boxes) and not boxes[0].overlaps(boxes[1])
-    assert not any(box.overlaps(point) for box in boxes for point in points)
+    frame, radius, (width, height) = (0.0, 0.0, 100.0, 60.0), 4.0, (30.0, 12.0)
+    centres = [(20.0, 30.0), (24.0, 30.0), (60.0, 5.0), (50.0, 50.0)]
+    sizes = [(width, height), (width, height), (90.0, height), (0.0, height)]
+    corners = chart.place_labels(centres, [radius] * 4, sizes, frame)
+    assert corners[2:] == [None, None], "one is too wide, and one is empty"
+    taken = [(x - radius, y - radius, x + radius, y + radius) for x, y in centres]
+    for corner in corners[:2]:
+        assert corner is not None
+        box = (*corner, corner[0] + width, corner[1] + height)
+        assert is_free(box, frame, taken)
+        taken.append(box)

@@ -9,12 +9,12 @@ import pytest
 
 from wgsss.gpu import Gpu
 from wgsss.methods import make_method
-from wgsss.reference import Integral
+from wgsss.reference import Finished, Integral
 from wgsss.scene import load_scene
 from wgsss.stage import Stage
 from wgsss.viewer.painter import measure
 from wgsss.viewer.pictures import LiveRenderer, View
-from wgsss.viewer.reference import BackgroundReference, EstimateMethod, Request
+from wgsss.viewer.reference import BackgroundReference, Request
 
 SIZE = (16, 8)
 SCENE = load_scene("slab", vertices=300)
@@ -60,7 +60,7 @@ def test_requests_do_not_block_and_a_process_that_died_is_replaced() -> None:
 
 def test_errors_are_those_of_the_pictures_and_vanish_for_the_reference_itself(gpu: Gpu) -> None:
     renderer = LiveRenderer(gpu)
-    reference = EstimateMethod(REFERENCE.estimate(Stage(gpu, SCENE), SIZE))
+    reference = Finished(REFERENCE.estimate(Stage(gpu, SCENE), SIZE))
     drawing = renderer.draw(View(SCENE, (make_method("lambert"), reference), SIZE))
     measurement = measure(drawing, drawing.pictures, reference)
     assert measurement is not None

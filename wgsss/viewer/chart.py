@@ -1,18 +1,18 @@
-"""The scatter plot of speed against accuracy: its points, their Pareto front, its axes, and where labels fit."""
+"""The scatter plot of speed against accuracy as the viewer shows it: points, Pareto front, axes and label positions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.methods import Method
+from wgsss.study import scatter
 from wgsss.study.run_record import Run
-from wgsss.study.scatter import LEAST_ERROR, pareto_front, style, ticks
-from wgsss.viewer.history import MeasuredPoint, method_label, run_label
+from wgsss.study.scatter import LEAST_ERROR, Box, setting_text
+from wgsss.viewer.history import MeasuredPoint, method_label
 
 Colour = tuple[float, float, float, float]
 """sRGB and opacity, each from 0 to 1"""
@@ -22,6 +22,8 @@ OLDEST_OPACITY = 0.35
 BENCH_OPACITY = 0.4
 SIDE_RADIUS, EARLIER_RADIUS, BENCH_RADIUS = 7.0, 4.0, 3.0
 """logical pixels: of the methods shown now, of those measured before, and of the runs of a benchmark"""
+_LEAST_MARGIN = 0.08
+"""at each end of an axis, decades"""
 _MAX_TIME_TICKS = 5
 """ticks of the time axis that fit side by side"""
 _LABEL_OFFSETS = ((8, -7), (-8, -7), (0, -21), (0, 7), (8, 5), (-8, 5), (8, -19), (-8, -19))
@@ -46,30 +48,6 @@ class ChartPoint:
     radius: float
     letter: str = ""
     """written on the point: the sides that it stands for"""
-
-
-class Box(NamedTuple):
-    """A rectangle on the screen, pixels, y down."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-
-    def contains(self, other: Box) -> bool:
-        """Return whether another box lies within this one."""
-        return (
-            self.left <= other.left
-            and other.right <= self.right
-            and self.top <= other.top
-            and other.bottom <= self.bottom
-        )
-
-    def overlaps(self, other: Box) -> bool:
-        """Return whether this box and another have an area in common."""
-        return (
-            self.left < other.right and other.left < self.right and self.top < other.bottom and other.top < self.bottom
-        )
 
 
 def session_points(measured: Sequence[MeasuredPoint], methods: Sequence[Method]) -> list[ChartPoint]:
@@ -100,7 +78,7 @@ def bench_points(runs: Sequence[Run]) -> list[ChartPoint]:
         ChartPoint(
             run["frame_ms"],
             100 * (run["error"]["rel_rmse"] or 0.0),
-            run_label(run["method"], run["knobs"]),
+            setting_text(run["method"], run["knobs"]),
             run["method"] if most_accurate[run["method"]] is run else "",
             method_colour(run["method"], BENCH_OPACITY),
             BENCH_RADIUS,
@@ -111,28 +89,26 @@ def bench_points(runs: Sequence[Run]) -> list[ChartPoint]:
 
 def method_colour(method: str, opacity: float) -> Colour:
     """Return the colour of a method in all charts, with white in place of black."""
-    text = style(method)[0]
+    text = scatter.style(method).colour
     red, green, blue = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return (red, green, blue, opacity) if red + green + blue > 0 else (1.0, 1.0, 1.0, opacity)
 
 
 def front_steps(points: Sequence[ChartPoint]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return x and y of the steps along the Pareto front: the lowest error (y) that is reached within a time (x)."""
-    best = [points[i] for i in pareto_front([(point.ms, point.error) for point in points])]
+    best = [points[i] for i in scatter.pareto_front([(point.ms, point.error) for point in points])]
     x, y = np.array([point.ms for point in best]), np.array([point.error for point in best])
     return np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
 
 
 def axis_limits(values: Sequence[float]) -> tuple[float, float]:
     """Return limits of a logarithmic axis with a margin around all values; it spans half a decade at least."""
-    low, high = np.log10(min(values)), np.log10(max(values))
-    margin = max(0.1 * (high - low), 0.25 - 0.5 * (high - low), 0.08)
-    return float(10 ** (low - margin)), float(10 ** (high + margin))
+    return scatter.axis_limits(values, least_margin=_LEAST_MARGIN, least_span=0.5)
 
 
 def time_ticks(low: float, high: float) -> list[float]:
     """Return the ticks of the time axis: powers of ten alone if there is no room for more."""
-    values = ticks(low, high)
+    values = scatter.ticks(low, high)
     return values if len(values) <= _MAX_TIME_TICKS else [value for value in values if f"{value:e}".startswith("1")]
 
 
@@ -150,14 +126,14 @@ def place_labels(
     Returns:
         None for a label for which there is no room.
     """
-    taken = [Box(x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)]
+    taken = [(x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)]
     corners: list[tuple[float, float] | None] = []
     for (x, y), (width, height) in zip(centres, sizes, strict=True):
         corner = None
         for dx, dy in _LABEL_OFFSETS if width else ():
             left, top = x + dx - width * (0.5 - 0.5 * float(np.sign(dx))), y + dy
-            box = Box(left, top, left + width, top + height)
-            if frame.contains(box) and not any(box.overlaps(other) for other in taken):
+            box = left, top, left + width, top + height
+            if scatter.is_free(box, frame, taken):
                 taken.append(box)
                 corner = left, top
                 break

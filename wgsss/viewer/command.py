@@ -13,9 +13,8 @@ from wgsss.methods import Method, make_method, name_of
 from wgsss.scene import Camera, Light, Scene, load_scene
 from wgsss.scene.scenefile import CAMERAS, LIGHTS
 from wgsss.scene.tables import Table
+from wgsss.study.run_record import Knob
 from wgsss.viewer.pictures import View
-
-KnobValue = bool | int | float | str
 
 
 @dataclass(frozen=True)
@@ -79,12 +78,12 @@ def render_command(source: Source, opened: Scene, material: str | Table | None, 
     return shlex.join([*words, "--size", f"{view.size[0]}x{view.size[1]}"])
 
 
-def knob_values(method: Method) -> dict[str, KnobValue]:
+def knob_values(method: Method) -> dict[str, Knob]:
     """Return the values of all knobs of a method by name."""
     return {f.name: getattr(method, f.name) for f in fields(method)}  # type: ignore[arg-type]
 
 
-def changed_knobs(method: Method) -> dict[str, KnobValue]:
+def changed_knobs(method: Method) -> dict[str, Knob]:
     """Return the values of the knobs of a method that are not at their defaults, by name."""
     default = knob_values(make_method(name_of(method)))
     return {knob: value for knob, value in knob_values(method).items() if value != default[knob]}

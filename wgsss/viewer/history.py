@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from wgsss.study.metrics import Errors
 from wgsss.study.provenance import adapter, scene_digest
 from wgsss.study.run_log import FILE, read_runs
 from wgsss.study.run_record import Run
-from wgsss.study.scatter import panels
-from wgsss.viewer.command import KnobValue, changed_knobs
+from wgsss.study.scatter import panels, setting_text
+from wgsss.viewer.command import changed_knobs
 from wgsss.viewer.pictures import View
 
 BENCH_FOLDER = Path("bench")
@@ -78,12 +78,7 @@ class History:
 
 def method_label(method: Method) -> str:
     """Return the name of a method and its knobs that are not at their defaults."""
-    return run_label(name_of(method), changed_knobs(method))
-
-
-def run_label(method: str, knobs: Mapping[str, KnobValue]) -> str:
-    """Return the name of a method followed by its knobs and their values."""
-    return ", ".join([method, *(f"{k} {f'{v:.4g}' if isinstance(v, float) else v}" for k, v in knobs.items())])
+    return setting_text(name_of(method), changed_knobs(method))
 
 
 def _key(view: View) -> Hashable:

@@ -13,11 +13,11 @@ import numpy.typing as npt
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
 from wgsss.methods import Method, name_of
-from wgsss.reference import REFERENCES, Integral, Reference
+from wgsss.reference import REFERENCES, Finished, Integral, Reference
 from wgsss.study.error_maps import coloured
 from wgsss.study.metrics import Errors, error_map, errors
 from wgsss.viewer.pictures import Drawing, LiveRenderer, Picture, View
-from wgsss.viewer.reference import BackgroundReference, EstimateMethod, Request
+from wgsss.viewer.reference import BackgroundReference, Request
 from wgsss.viewer.reload import Shaders
 from wgsss.wgsl import WgslError
 
@@ -62,7 +62,7 @@ class Measurement:
     """uint8 (H, W, 4), colours of the left side's error relative to the right side; None: a side has no picture"""
 
 
-def measure(drawing: Drawing, sides: Sequence[Picture | None], reference: EstimateMethod | None) -> Measurement | None:
+def measure(drawing: Drawing, sides: Sequence[Picture | None], reference: Finished | None) -> Measurement | None:
     """Measure the errors of the two sides. Return None if no pixel shows an object."""
     mask = drawing.object_mask
     if not mask.any():
@@ -84,7 +84,7 @@ class _Drawn:
 
     view: View
     scale: float
-    reference: EstimateMethod | None
+    reference: Finished | None
     is_moving: bool
     """whether things moved: if so, nothing was measured"""
 
@@ -113,7 +113,7 @@ class Painter:
         """methods of the last drawing, with estimates in place of references"""
         self._last: _Drawn | None = None
         """None: draw again whatever the view is"""
-        self._estimate_method: EstimateMethod | None = None
+        self._finished: Finished | None = None
         self._changed_s = -1.0
         """when the view last changed"""
         self._pool_key: tuple[list[str], tuple[int, int]] | None = None
@@ -203,7 +203,7 @@ class Painter:
             self.gpu.trim()
             self._pool_key = key
 
-    def _latest_estimate(self, view: View, is_measured: bool) -> EstimateMethod | None:
+    def _latest_estimate(self, view: View, is_measured: bool) -> Finished | None:
         """Return the best estimate so far of the reference that a side shows, or that errors are measured against."""
         references = [method for method in view.methods if _is_reference(method)]
         if not references and not is_measured:
@@ -212,9 +212,9 @@ class Painter:
         estimate = self.reference.estimate(Request(view.scene, view.time_s, view.size, reference))
         if estimate is None:
             return None
-        if self._estimate_method is None or self._estimate_method.estimate is not estimate:
-            self._estimate_method = EstimateMethod(estimate)
-        return self._estimate_method
+        if self._finished is None or self._finished.estimate is not estimate:
+            self._finished = Finished(estimate)
+        return self._finished
 
 
 def _is_reference(method: Method) -> TypeGuard[Reference]:

@@ -9,39 +9,19 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, RenderError
-from wgsss.frame import Frame
-from wgsss.methods import Diffused
 from wgsss.reference import Estimate, Reference
-from wgsss.reference.estimate import show
 from wgsss.scene import Scene
 from wgsss.stage import Stage
 
 SCALES = (0.25, 0.5, 1.0)
 """sizes of the successive estimates, relative to the sides of the picture"""
 PROCESS_ENDED = "the process that estimates references has ended"
-
-
-@dataclass(frozen=True, eq=False)
-class EstimateMethod:
-    """A method that shows an estimate which has been computed before."""
-
-    estimate: Estimate
-
-    source: ClassVar[str] = ""
-    sweep: ClassVar[tuple[dict[str, Any], ...]] = ()
-
-    def bake(self, stage: Stage) -> None:
-        """Do nothing: the estimate is complete."""
-
-    def passes(self, frame: Frame) -> Diffused:
-        """Declare the passes that show the estimate, which must have the size of the frame."""
-        return show(frame, self.estimate)
 
 
 @dataclass(frozen=True)

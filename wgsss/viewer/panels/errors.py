@@ -9,7 +9,7 @@ from imgui_bundle import imgui, implot
 
 from wgsss.study.scatter import ticks
 from wgsss.viewer import chart
-from wgsss.viewer.chart import Box, ChartPoint, Colour
+from wgsss.viewer.chart import ChartPoint, Colour
 from wgsss.viewer.session import SIDES, Session
 
 HEIGHT = 260
@@ -92,7 +92,7 @@ def _write_labels(points: Sequence[ChartPoint]) -> None:
         [(centre.x, centre.y) for centre in centres],
         [point.radius for point in points],
         [(size.x, size.y) for size in sizes],
-        Box(left_top.x, left_top.y, right_bottom.x, right_bottom.y),
+        (left_top.x, left_top.y, right_bottom.x, right_bottom.y),
     )
     for corner, point in zip(corners, points, strict=True):
         if corner is not None:

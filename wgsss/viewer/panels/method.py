@@ -12,11 +12,12 @@ from imgui_bundle import imgui
 from wgsss.errors import InputError
 from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, Method, make_method, name_of
 from wgsss.reference import REFERENCES
-from wgsss.viewer.command import KnobValue, knob_values
+from wgsss.study.run_record import Knob
+from wgsss.viewer.command import knob_values
 from wgsss.viewer.panels.widgets import CLAMPED, LOGARITHMIC, choice, rounded
 from wgsss.viewer.session import Session
 
-Knob = Field[Any]
+KnobField = Field[Any]
 
 DOUBLING_RANGE = 300
 """largest value of a whole number from which on its buttons double and halve it; otherwise they add and subtract 1"""
@@ -41,7 +42,7 @@ def declare_method(session: Session, side: int) -> None:
             session.attempt(partial(_set_knob, session, side, knob, new))
 
 
-def with_knob(method: Method, knob: Knob, value: KnobValue) -> Method:
+def with_knob(method: Method, knob: KnobField, value: Knob) -> Method:
     """Return the method with another value of a knob.
 
     If the method refuses a whole number, such as an even one, take the next in the direction of the change. Raises
@@ -61,11 +62,11 @@ def with_knob(method: Method, knob: Knob, value: KnobValue) -> Method:
     raise error
 
 
-def _set_knob(session: Session, side: int, knob: Knob, value: KnobValue) -> None:
+def _set_knob(session: Session, side: int, knob: KnobField, value: Knob) -> None:
     session.set_method(side, with_knob(session.methods[side], knob, value))
 
 
-def _declare_knob(knob: Knob, value: Any) -> Any:
+def _declare_knob(knob: KnobField, value: Any) -> Any:
     """Declare a control that suits the type and the range of a knob, and return its value."""
     if "choices" in knob.metadata:
         return choice(knob.name, value, knob.metadata["choices"])
@@ -82,7 +83,7 @@ def _declare_knob(knob: Knob, value: Any) -> Any:
     return rounded(moved) if changed else value
 
 
-def _declare_help(knob: Knob) -> None:
+def _declare_help(knob: KnobField) -> None:
     """Declare a tooltip for the control above, with the help text and the unit of its knob."""
     unit = knob.metadata["unit"]
     imgui.set_item_tooltip(f"{knob.metadata['help']}{f', {unit}' if unit else ''}".replace("%", "%%"))
