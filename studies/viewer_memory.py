@@ -18,7 +18,7 @@ from rendercanvas.glfw import loop
 
 from wgsss.errors import InputError
 from wgsss.gpu import default_gpu
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, make_method
+from wgsss.registry import METHODS, SURFACES, TRANSLUCENCIES, make_method
 from wgsss.viewer.command import Source
 from wgsss.viewer.painter import SCALES
 from wgsss.viewer.session import Session

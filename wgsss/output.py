@@ -45,7 +45,7 @@ def check_output(path: str | Path, formats: Sequence[str] = FORMATS) -> Path:
     if path.suffix.lower() not in formats:
         raise InputError(f"{path}: the file extension must be {' or '.join(formats)}")
     with naming_path(path):
-        _check_place(path)
+        _check_target(path)
         if not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder '{path.parent}'")
         trial = _temporary(path)  # permissions alone do not decide whether a file can be written

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.study.scatter import is_free
 from wgsss.viewer import chart
 from wgsss.viewer.chart import ChartPoint

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from wgsss.methods import Method, make_method
-from wgsss.reference import REFERENCES
+from wgsss.methods import Method
+from wgsss.registry import REFERENCES, make_method
 from wgsss.scene import Scene, load_scene
 from wgsss.scene.loading import with_material
 from wgsss.study.metrics import Errors

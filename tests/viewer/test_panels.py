@@ -10,8 +10,7 @@ import pytest
 
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
-from wgsss.methods import METHODS, make_method
-from wgsss.reference import REFERENCES
+from wgsss.registry import METHODS, REFERENCES, make_method
 from wgsss.scene import MATERIALS
 from wgsss.study.light_types import light_types
 from wgsss.viewer.command import Source

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
 from wgsss.methods.sam.method import Adjacency
+from wgsss.registry import make_method
 from wgsss.scene import load_scene
 from wgsss.stage import Stage
 from wgsss.viewer.sender_lines import find_sam, sender_lines

@@ -15,7 +15,7 @@ from PIL import Image as Picture
 from wgsss.cli import main
 from wgsss.errors import InputError
 from wgsss.gpu import Gpu
-from wgsss.methods import make_method
+from wgsss.registry import make_method
 from wgsss.scene import (
     DirectionalLight,
     EnvironmentLight,

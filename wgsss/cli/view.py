@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> None:
 
 def _parse_against(text: str) -> Method:
     """Return the method of --against, with its knobs set."""
-    from wgsss.methods import make_method
+    from wgsss.registry import make_method
 
     (name, knobs), *more = arguments.settings(text)
     if more:

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from wgsss.methods import Method, make_method, name_of
+from wgsss.methods import Method
+from wgsss.registry import make_method, name_of
 from wgsss.scene import Camera, Light, Scene, load_scene
 from wgsss.scene.scenefile import CAMERAS, LIGHTS
 from wgsss.scene.tables import Table

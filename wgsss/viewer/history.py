@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from wgsss.errors import InputError
-from wgsss.methods import Method, name_of
-from wgsss.reference import REFERENCES
+from wgsss.methods import Method
+from wgsss.registry import REFERENCES, name_of
 from wgsss.scene import Scene
 from wgsss.study.metrics import Errors
 from wgsss.study.provenance import adapter, scene_digest

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, RenderError
 from wgsss.gpu import Gpu
-from wgsss.methods import Method, name_of
-from wgsss.reference import REFERENCES, Finished, Integral, Reference
+from wgsss.methods import Method
+from wgsss.reference import Finished, Integral, Reference
+from wgsss.registry import REFERENCES, name_of
 from wgsss.study.error_maps import coloured
 from wgsss.study.metrics import Errors, error_map, errors
 from wgsss.viewer.pictures import Drawing, LiveRenderer, Picture, View

@@ -10,8 +10,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from wgsss.errors import InputError
-from wgsss.methods import METHODS, SURFACES, TRANSLUCENCIES, Method, make_method, name_of
-from wgsss.reference import REFERENCES
+from wgsss.methods import Method
+from wgsss.registry import METHODS, REFERENCES, SURFACES, TRANSLUCENCIES, make_method, name_of
 from wgsss.study.run_record import Knob
 from wgsss.viewer.command import knob_values
 from wgsss.viewer.panels.widgets import CLAMPED, LOGARITHMIC, choice, rounded

@@ -9,7 +9,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from wgsss.methods import name_of
+from wgsss.registry import name_of
 from wgsss.viewer.panels.errors import declare_errors
 from wgsss.viewer.panels.light import declare_light
 from wgsss.viewer.panels.material import declare_material
