@@ -2,8 +2,8 @@
 
 import package::units::{Number};
 
-// Unpolarised Fresnel reflectance for light that meets the boundary from outside at angle `cos_i` from the normal,
-// `eta` being the index inside over that outside.
+// Fresnel reflectance of unpolarised light from outside. `cos_i` is the cosine of the angle of incidence, `eta` the
+// refractive index inside over that outside.
 fn fresnel_dielectric(cos_i: Number, eta: Number) -> Number {
     let c = clamp(cos_i, 0.0, 1.0);
     let cos_t = sqrt(max(1.0 - (1.0 - c * c) / (eta * eta), 0.0));

@@ -1,5 +1,5 @@
-// The specular lobe: microfacets of GGX distribution (Walter et al. 2007) with Smith's height-correlated shadowing
-// (Heitz 2014). `alpha` is roughness squared; all vectors and cosines are about the shading normal.
+// The specular lobe: microfacets with the GGX distribution (Walter et al. 2007) and Smith's height-correlated shadowing
+// (Heitz 2014). `alpha` is the squared roughness; cosines are those of angles from the shading normal.
 
 import package::units::{Number, Direction, PI};
 import package::fresnel::{fresnel_dielectric};
@@ -37,7 +37,8 @@ fn ggx_brdf(n: Direction, w_i: Direction, w_o: Direction, alpha: Number, eta: Nu
     return f * ggx_distribution(dot(n, h), alpha) * ggx_visibility(cos_i, cos_o, alpha);
 }
 
-// A microfacet normal drawn from those visible along w_o (Heitz 2018), in the frame where the normal is z.
+// A random microfacet normal among those visible from w_o (Heitz 2018), in the frame whose z axis is the shading
+// normal.
 fn ggx_sample_visible(w_o: Direction, alpha: Number, u: vec2f) -> Direction {
     let v = normalize(vec3f(alpha * w_o.xy, w_o.z));
     let length2 = dot(v.xy, v.xy);

@@ -15,12 +15,12 @@ import package::sampling::{map_of_direction};
 @group(1) @binding(13) var environment: texture_2d<f32>; // L_d by normal (frame/prefilter_irradiance.wgsl)
 @group(1) @binding(14) var linear_wrap_u: sampler;
 
-// The receiver is lifted along its normal by this many shadow texels per unit of sine. The filter reaches 1.5 texels, over
-// which a plane's depth rises by that many texels times the tangent; lifting it farther would let light leak.
+// The receiver is lifted along its normal by this many shadow texels per unit of sine. The filter reaches 1.5 texels,
+// over which a plane's depth rises by that many texels times the tangent; lifting it farther would let light leak.
 const LIFT_TEXELS: Number = 2.0;
 
-// A side of the filtered area in the view's normalised coordinates: that of `side` (mm), but at least the two texels that
-// one lookup spans; along `otherwise` where the side is a point. `texels` is the size of the map, -1 to 1 in these
+// A side of the filtered area in the view's normalised coordinates: that of `side` (mm), but at least the two texels
+// that one lookup spans; along `otherwise` where the side is a point. `texels` is the size of the map, -1 to 1 in these
 // coordinates.
 fn side_of_filter(view: ShadowView, side: vec3f, at: vec3f, w: f32, otherwise: vec3f, texels: f32) -> vec3f {
     let clip = view.world_to_clip * vec4f(side, 0.0);

@@ -1,6 +1,6 @@
-// Passes over the pixels of one object (`Frame.per_object`, wgsss/frame.py). This module owns the vertex shader, which draws
-// a rectangle around the object, and the bindings of the object and of the g-buffer. A pass that imports it is given
-// them by the frame, and binds those that it uses. Its fragment shader begins with
+// Passes over the pixels of one object (`Frame.per_object`, wgsss/frame.py). This module owns the vertex shader, which
+// draws a rectangle around the object, and the bindings of the object and of the g-buffer. A pass that imports it is
+// given them by the frame, and binds those that it uses. Its fragment shader begins with
 //
 //     let texel = vec2u(pixel.xy);
 //     if is_other_object(texel) {
@@ -48,8 +48,8 @@ fn sky_at(texel: vec2u) -> Number {
     return textureLoad(gbuffer_id, texel, 0).w;
 }
 
-// The position, normal, scale of the specular lobe and base colour of what a pixel shows. The base colour is that of map
-// and vertices, which the shares in mesh.wgsl multiply by the object's.
+// The position, normal, scale of the specular lobe and base colour of what a pixel shows. The base colour is that of
+// map and vertices, which the shares in mesh.wgsl multiply by the object's.
 fn position_at(texel: vec2u) -> Position {
     return position_of_pixel(vec2f(texel) + 0.5, depth, view.clip_to_world);
 }

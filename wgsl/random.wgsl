@@ -1,8 +1,8 @@
-// Random numbers by hashing: the same for the same key, whoever asks and in whichever order.
+// Random numbers by hashing: the number for a key does not depend on which invocation computes it, or when.
 
 import package::units::{Number};
 
-// Four random words for a key of four (Jarzynski and Olano 2020, "Hash functions for GPU rendering": pcg4d).
+// Four random words from a key of four words (Jarzynski & Olano 2020, "Hash functions for GPU rendering": pcg4d).
 fn random_words(key: vec4u) -> vec4u {
     var v = key * 1664525u + 1013904223u;
     v.x += v.y * v.w;
@@ -17,7 +17,7 @@ fn random_words(key: vec4u) -> vec4u {
     return v;
 }
 
-// Random numbers above 0, up to 1, of random words. They do not tell a word's last bits.
+// Random numbers greater than 0 and at most 1, from random words. They do not depend on the last bits of a word.
 fn random_numbers(words: vec4u) -> vec4f {
     return (vec4f(words) + 0.5) * 2.3283064365386963e-10; // 2^-32
 }

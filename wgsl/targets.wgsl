@@ -1,4 +1,4 @@
-// Render targets: an output declared with one of these types gets a texture of that format.
+// Types of fragment outputs. An output of one of these types is drawn to a texture of that format.
 
 alias RGBA32Float = vec4f;
 alias RGBA16Float = vec4f;

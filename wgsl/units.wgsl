@@ -1,4 +1,4 @@
-// Units and conventions, once, for every module.
+// Units and conventions of all modules.
 //
 //   lengths          millimetres
 //   radiometry       irradiance in W/m^2, radiance in W/(m^2 sr), intensity in W/sr; RGB, linear, Rec.709 primaries
@@ -7,10 +7,10 @@
 //   textures         u to the right, v down; texel (i, j) has its centre at ((i + 1/2) / width, (j + 1/2) / height)
 //   triangles        counter-clockwise seen from outside
 //
-//   x_i, n_i         where light enters, and the normal there
-//   x_o, n_o         where light leaves
+//   x_i, n_i         point where light enters, and the normal there
+//   x_o, n_o         point where light leaves, and the normal there
 //   w_i, w_o         unit directions from the surface to the light and to the viewer
-//   L_d              transmitted irradiance: light that has entered at x_i            (Maisch & Ropinski 2017, eq. 4)
+//   L_d              transmitted irradiance: the light that enters at x_i             (Maisch & Ropinski 2017, eq. 4)
 //   M                the surface integral of R_d L_d, split into M_front and M_back   (eq. 6, 7)
 //   R_d              diffusion profile, 1/mm^2
 //   rho_dt           share of the light that the surface does not reflect             (eq. 3)

@@ -1,19 +1,19 @@
-// One direction of bloom: a share of the light of each pixel spreads over those around it, as in a lens or an eye. What
-// would leave the image is reflected at its border, so that nothing is lost.
+// One direction of bloom: a share of each pixel's light spreads over the pixels around it, as in a lens or an eye.
+// Light that would leave the image is reflected at its border, so that the sum stays the same.
 
 import package::screen::{screen_corner};
 import package::targets::{RGBA32Float};
 
-override DIRECTION: u32; // 0 along rows, 1 along columns; then what has spread is mixed with what has not
+override DIRECTION: u32; // 0: along rows; 1: along columns, and mixed with the light that does not spread
 
 struct Params {
-    strength: f32, // the share that spreads
+    strength: f32, // share of the light that spreads
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var radiance: texture_2d<f32>;
-@group(0) @binding(2) var spread: texture_2d<f32>; // the radiance, or what the first direction made of it
-@group(0) @binding(3) var<storage, read> weights: array<f32>; // of the pixel itself and those at 1, 2, ... to each side
+@group(0) @binding(2) var spread: texture_2d<f32>; // the radiance, or the result of the first direction
+@group(0) @binding(3) var<storage, read> weights: array<f32>; // of the pixel itself and of those at distances 1, 2, ...
 
 struct Pixel {
     @location(0) bloomed: RGBA32Float,
@@ -44,7 +44,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     }
     if DIRECTION == 1u {
         total = mix(textureLoad(radiance, here, 0), total, params.strength);
-        total = vec4f(total.rgb / max(total.a, 1e-20), total.a); // over black, what arrives
+        total = vec4f(total.rgb / max(total.a, 1e-20), total.a); // the light that arrives, over black
     }
     return Pixel(total);
 }

@@ -1,4 +1,4 @@
-// What is seen at each pixel: which object, where in its atlas, its normal, base colour and specular scale.
+// The g-buffer: the object that each pixel shows, its atlas coordinates there, normal, base colour and specular scale.
 
 import package::units::{Number};
 import package::mesh::{Vertex, ObjectUniforms, bent_normal, map_coordinates};
@@ -6,7 +6,7 @@ import package::targets::{RGBA32Float, RGBA16Float, RGBA8UnormSrgb};
 
 struct Params {
     world_to_clip: mat4x4f,
-    eye: vec4f, // xyz, 1: where the camera is; xyz, 0: the direction towards it
+    eye: vec4f, // xyz, 1: the camera's position; xyz, 0: the direction towards it
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -16,7 +16,7 @@ struct Params {
 @group(0) @binding(4) var normal_map: texture_2d<f32>;
 @group(0) @binding(5) var specular_map: texture_2d<f32>;
 @group(0) @binding(6) var linear_repeat: sampler;
-@group(0) @binding(7) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
+@group(0) @binding(7) var<storage, read> colors: array<vec4f>; // of each render vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -29,9 +29,9 @@ struct Varying {
 }
 
 struct GBuffer {
-    @location(0) gbuffer_id: RGBA32Float, // atlas u, v; object id; share of the sky that is not hidden
+    @location(0) gbuffer_id: RGBA32Float, // atlas u, v; object id; share of the environment's irradiance, see mesh.wgsl
     @location(1) normal: RGBA16Float,     // shading normal, world; specular scale
-    @location(2) base_color: RGBA8UnormSrgb, // of map and vertices alone: 8 bits hold them, but not their products
+    @location(2) base_color: RGBA8UnormSrgb, // of texture and vertices, without the object's factor, for 8 bits to suffice
 }
 
 @vertex
@@ -49,7 +49,8 @@ fn fs(in: Varying) -> GBuffer {
     let slope = textureSample(normal_map, linear_repeat, normal_at).xyz;
     var n = bent_normal(normalize(in.normal), in.position, in.uv, slope, object.normal_scale);
     let to_eye = params.eye.xyz - in.position * params.eye.w;
-    let facing = cross(dpdx(in.position), dpdy(in.position)); // an open sheet seen from behind shows its back
+    let facing = cross(dpdx(in.position), dpdy(in.position)); // the side of the triangle that is seen
+    // An open sheet seen from behind shows its back: there the normal is reversed.
     if dot(in.normal, to_eye) < 0.0 && dot(in.normal, facing) * dot(facing, to_eye) < 0.0 {
         n = -n;
     }

@@ -1,4 +1,4 @@
-// L_d at points on one object: its vertices, or any others. Normal maps, which need derivatives, are left out.
+// L_d at points on one object, such as its vertices. Normal maps, which need derivatives, are not applied.
 
 import package::mesh::{Vertex, ObjectUniforms, color_before, map_coordinates};
 import package::lights::{transmitted_irradiance};
@@ -9,7 +9,7 @@ import package::lights::{transmitted_irradiance};
 @group(0) @binding(3) var specular_map: texture_2d<f32>;
 @group(0) @binding(4) var linear_repeat: sampler;
 @group(0) @binding(5) var<storage, read> colors: array<vec4f>; // of each point, or one for all
-@group(0) @binding(6) var<storage, read_write> irradiance: array<vec4f>; // L_d times the base colour's share before diffusion
+@group(0) @binding(6) var<storage, read_write> irradiance: array<vec4f>; // L_d times the share of the base colour before diffusion
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {

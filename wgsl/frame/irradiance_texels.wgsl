@@ -1,4 +1,4 @@
-// L_d over the atlas of one object: its triangles drawn where their atlas coordinates are (Mikkelsen 2009, 3.4, step 2).
+// L_d over the atlas of one object: its triangles are drawn at their atlas coordinates (Mikkelsen 2009, 3.4, step 2).
 
 import package::units::{Number};
 import package::mesh::{Vertex, ObjectUniforms, bent_normal, color_before, map_coordinates};
@@ -7,9 +7,9 @@ import package::screen::{direction_to_eye};
 import package::targets::{RGBA16Float};
 
 struct Params {
-    unit: f32,                // W/m^2 that a value of 1 stands for
-    eye: vec4f,               // xyz, 1: where the camera is; xyz, 0: the direction towards it
-    planes: array<vec4f, 6>,  // texels behind any of them are not lit
+    unit: f32,                // irradiance that a value of 1 means, W/m^2
+    eye: vec4f,               // xyz, 1: the camera's position; xyz, 0: the direction towards it
+    planes: array<vec4f, 6>,  // texels behind any of these planes are left out
 }
 
 @group(0) @binding(0) var<uniform> object: ObjectUniforms;
@@ -19,9 +19,10 @@ struct Params {
 @group(0) @binding(4) var specular_map: texture_2d<f32>;
 @group(0) @binding(5) var linear_repeat: sampler;
 @group(0) @binding(6) var<uniform> params: Params;
-// Of the angle between normal and viewer, from which on texels are lit: at each vertex, or one for all.
+// Texels are left out where the cosine of the angle between normal and viewer is smaller; by render vertex, or one for
+// all.
 @group(0) @binding(7) var<storage, read> least_cosines: array<f32>;
-@group(0) @binding(8) var<storage, read> colors: array<vec4f>; // of each vertex, or one for all
+@group(0) @binding(8) var<storage, read> colors: array<vec4f>; // of each render vertex, or one for all
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -34,7 +35,7 @@ struct Varying {
 }
 
 struct Texel {
-    @location(0) irradiance: RGBA16Float, // in params.unit: L_d times the base colour's share before diffusion; 1 where lit
+    @location(0) irradiance: RGBA16Float, // in params.unit: L_d times the share of the base colour before diffusion; 1, or 0 where left out
 }
 
 @vertex
@@ -48,23 +49,23 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
     return Varying(clip, x.xyz, n.xyz, vec2f(vertex.u, vertex.v), vertex.sky, least_cosine, color);
 }
 
-// Whether a part of the texel about x faces the viewer enough, in front of all planes.
-fn is_wanted(x: Position, n: Direction, least_cosine: Number) -> bool {
+// Whether a part of the texel around x faces the viewer enough and is in front of all planes.
+fn is_visible(x: Position, n: Direction, least_cosine: Number) -> bool {
     let cosine = dot(n, direction_to_eye(params.eye, x));
-    var wanted = cosine + fwidth(cosine) >= least_cosine;
+    var visible = cosine + fwidth(cosine) >= least_cosine;
     for (var i = 0u; i < 6u; i++) {
-        wanted = wanted && dot(params.planes[i], vec4f(x, 1.0)) >= 0.0;
+        visible = visible && dot(params.planes[i], vec4f(x, 1.0)) >= 0.0;
     }
-    return wanted;
+    return visible;
 }
 
 @fragment
 fn fs(in: Varying) -> Texel {
     let x = in.position;
-    let dx = dpdx(x); // the texel's sides: what it holds is the mean over them, or a shadow's edge would move by half a texel
+    let dx = dpdx(x); // the sides of the texel, over which L_d is averaged: edges of shadows would move by half a texel
     let dy = dpdy(x);
     let n_s = normalize(in.normal);
-    let wanted = is_wanted(x, n_s, in.least_cosine);
+    let visible = is_visible(x, n_s, in.least_cosine);
     let normal_at = map_coordinates(object, in.uv, textureDimensions(normal_map));
     let n = bent_normal(n_s, x, in.uv, textureSample(normal_map, linear_repeat, normal_at).xyz, object.normal_scale);
     let specular_at = map_coordinates(object, in.uv, textureDimensions(specular_map));
@@ -72,11 +73,11 @@ fn fs(in: Varying) -> Texel {
     let color_at = map_coordinates(object, in.uv, textureDimensions(base_color_map));
     let color = in.color * textureSample(base_color_map, linear_repeat, color_at).rgb;
     var L_d = vec3f(0.0);
-    if wanted {
+    if visible {
         L_d = transmitted_irradiance(x, n, specular, in.sky, dx, dy);
     }
-    if !wanted {
-        discard; // at the end: on CPUs what is discarded runs on in the lanes of its neighbours
+    if !visible {
+        discard;
     }
     return Texel(vec4f(L_d / params.unit * color_before(object, color), 1.0));
 }

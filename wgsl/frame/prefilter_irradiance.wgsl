@@ -1,4 +1,4 @@
-// The environment's transmitted irradiance L_d for every normal (Maisch & Ropinski 2017, eq. 4), unoccluded.
+// L_d of the environment for every normal (Maisch & Ropinski 2017, eq. 4), without shadows.
 
 import package::units::{Number, PI};
 import package::rho_dt::{rho_dt};
@@ -6,7 +6,7 @@ import package::sampling::{direction_of_lat_long, direction_of_map};
 
 struct Params {
     specular: Number,
-    root: Number, // of what a value of 1 stands for
+    root: Number, // square root of the irradiance that a value of 1 means
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -35,6 +35,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    // The cosines' integral is pi; dividing by their sum takes the grid's own error out.
+    // The integral of the cosine is pi. Dividing by the sum of the cosines corrects the error of the grid.
     textureStore(irradiance, id.xy, vec4f(total * (PI / max(cosines, 1e-9)) / (params.root * params.root), params.root));
 }

@@ -1,4 +1,5 @@
-// The environment's radiance averaged over the specular lobe about each mirror direction, as seen along the normal.
+// The radiance of the environment averaged over the specular lobe around each mirror direction, as seen along the
+// normal.
 
 import package::units::{Number, PI};
 import package::ggx::{ggx_distribution};
@@ -6,7 +7,7 @@ import package::sampling::{direction_of_lat_long, direction_of_map};
 
 struct Params {
     alpha: Number,
-    root: Number, // of what a value of 1 stands for
+    root: Number, // square root of the radiance that a value of 1 means
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -21,7 +22,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let r = direction_of_map(id.xy, size);
     let source = textureDimensions(environment);
-    // A lobe narrower than a source texel would fall between texels.
+    // A lobe narrower than a texel of the environment could fall between texels.
     let alpha = max(params.alpha, 2.0 / f32(source.y));
     var total = vec3f(0.0);
     var weights = 0.0;

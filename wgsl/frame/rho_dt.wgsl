@@ -1,5 +1,6 @@
-// The table of rho_dt over the cosine (Maisch & Ropinski 2017, eq. 3): one minus the specular BRDF integrated over the
-// hemisphere, by sampling the microfacets that are visible along w_o. Each contributes F G2 / G1.
+// The table of rho_dt over the cosine (Maisch & Ropinski 2017, eq. 3): one minus the integral of the specular BRDF
+// times the cosine over the hemisphere, by sampling the microfacets visible from w_o. Each sample contributes F G2 /
+// G1.
 
 import package::units::{Number};
 import package::fresnel::{fresnel_dielectric};
@@ -9,13 +10,13 @@ import package::rho_dt::{RHO_DT_ENTRIES, rho_dt_cosine};
 
 struct Params {
     alpha: Number, // GGX width
-    eta: Number,   // index inside over outside
+    eta: Number,   // refractive index inside over outside
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var rho_dt_table: texture_storage_2d<r32float, write>;
 
-const SAMPLES: u32 = 1024u; // error below 1e-3 against quadrature for roughness 0.1 to 1
+const SAMPLES: u32 = 1024u; // the error is below 1e-3 for roughness 0.1 to 1
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {

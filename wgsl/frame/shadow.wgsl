@@ -1,4 +1,4 @@
-// Depth of the scene from a light.
+// A shadow map: the depth of an object as seen from a light.
 
 import package::mesh::{Vertex};
 

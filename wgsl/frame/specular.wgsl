@@ -30,8 +30,9 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let x = position_at(texel);
     let n = normal_at(texel);
     let w_o = direction_to_viewer(x);
-    // The lobe reflects the share 1 - rho_dt in all; the prefiltered environment is the mean radiance over it. The share of
-    // the sky that is hidden is that of the whole hemisphere, not of the lobe.
+    // The lobe reflects the share 1 - rho_dt of the light; the prefiltered environment is the mean radiance over the
+    // lobe. The share of the environment that the scene does not block is that of the whole hemisphere, not of the
+    // lobe.
     let towards = map_of_direction(reflect(-w_o, n), textureDimensions(reflection));
     let mirrored = textureSampleLevel(reflection, linear_wrap_u, towards, 0.0);
     let share = 1.0 - rho_dt(rho_dt_table, max(dot(n, w_o), 0.0), 1.0);

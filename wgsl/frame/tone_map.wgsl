@@ -1,4 +1,4 @@
-// From linear radiance to a display: exposure, tone curve, sRGB encoding by the target's format.
+// Convert linear radiance for a display: exposure and tone curve; the target's format encodes sRGB.
 
 import package::screen::{screen_corner};
 import package::targets::{RGBA8UnormSrgb};
@@ -8,8 +8,8 @@ const REINHARD: u32 = 1u;
 const ACES: u32 = 2u;
 
 struct Params {
-    scale: f32, // 2 to the exposure in stops
-    curve: u32,
+    scale: f32, // 2 to the power of the exposure in stops
+    curve: u32, // NONE, REINHARD or ACES
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -32,7 +32,7 @@ fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let sample = textureLoad(radiance, vec2u(pixel.xy), 0);
-    var c = clamp(sample.rgb * params.scale, vec3f(0.0), vec3f(1e9)); // beyond, the curves' squares overflow
+    var c = clamp(sample.rgb * params.scale, vec3f(0.0), vec3f(1e9)); // larger values would overflow in the curves
     if params.curve == REINHARD {
         c = c / (1.0 + c);
     } else if params.curve == ACES {

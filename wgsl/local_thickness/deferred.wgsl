@@ -1,4 +1,4 @@
-// M_back at the pixels of one object, from the thickness that a g-buffer has.
+// M_back at the pixels of one object, from the thickness in a g-buffer (gbuffer.wgsl).
 
 import package::local_thickness::packing::{unpack_grey, unpack_coloured, unpack_low};
 import package::local_thickness::transport::{Transport, light_out};
@@ -6,10 +6,10 @@ import package::per_object::{is_other_object, position_at, normal_at, base_color
 import package::targets::{RGBA32Float};
 
 override COLOURED: bool = true;
-override BITS: u32 = 0u; // of each channel of the colour, which tell the parameters
+override BITS: u32 = 0u; // of each channel of the colour that number the parameters
 
-@group(0) @binding(0) var<uniform> albedo: vec3f; // cDiffuseAlbedo, but for the base colour's map
-@group(0) @binding(1) var<storage, read> transports: array<Transport>; // that materials have
+@group(0) @binding(0) var<uniform> albedo: vec3f; // cDiffuseAlbedo, without the base colour of the g-buffer
+@group(0) @binding(1) var<storage, read> transports: array<Transport>; // the parameters of the materials
 @group(0) @binding(2) var stored: texture_2d<f32>;
 
 struct Pixel {

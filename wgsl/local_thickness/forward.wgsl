@@ -1,4 +1,4 @@
-// M_back of one object: at its vertices, and between them at the pixels.
+// M_back of one object, computed at its vertices and interpolated at the pixels.
 
 import package::mesh::{Vertex, ObjectUniforms};
 import package::screen::{direction_to_eye, is_hidden};
@@ -10,14 +10,14 @@ override MAPPED: bool = true; // whether the base colour varies over the object
 struct Params {
     world_to_clip: mat4x4f,
     eye: vec4f,
-    albedo: vec3f, // cDiffuseAlbedo, but for the base colour's map
+    albedo: vec3f, // cDiffuseAlbedo, without the base colour of the g-buffer
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> transport: Transport;
 @group(0) @binding(2) var<uniform> object: ObjectUniforms;
 @group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(4) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(4) var<storage, read> thickness: array<vec4f>; // by vertex of the mesh
 @group(0) @binding(5) var base_color: texture_2d<f32>;
 @group(0) @binding(6) var depth: texture_depth_2d;
 

@@ -1,4 +1,4 @@
-// The target of a g-buffer of 8 bits a channel that holds one object's translucency.
+// Write the thickness of one object into a target of a g-buffer with 8 bits per channel (packing.wgsl).
 
 import package::mesh::{Vertex, ObjectUniforms};
 import package::screen::{is_hidden};
@@ -6,17 +6,17 @@ import package::local_thickness::packing::{pack_grey, pack_coloured};
 import package::targets::{RGBA8Unorm};
 
 override COLOURED: bool = true;
-override BITS: u32 = 0u; // of each channel of the colour, for `which`
+override BITS: u32 = 0u; // of each channel of the colour that hold `which`
 
 struct Params {
     world_to_clip: mat4x4f,
-    which: u32, // of the parameters that materials have
+    which: u32, // number of the material's parameters
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> thickness: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(3) var<storage, read> thickness: array<vec4f>; // by vertex of the mesh
 @group(0) @binding(4) var depth: texture_depth_2d;
 
 struct Varying {

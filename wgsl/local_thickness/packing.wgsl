@@ -1,24 +1,24 @@
-// Translucency in the third target of a g-buffer of 8 bits a channel (Barré-Brisebois & Bouchard 2011, "Deferred Shading
-// G-Buffer Setup"):
+// The layout of translucency in the third target of a g-buffer with 8 bits per channel (Barré-Brisebois & Bouchard
+// 2011, "Deferred Shading G-Buffer Setup"):
 //
 //              R8                G8                   B8             A8
 //   grey       sky visibility    custom env. map      translucency   material ID
 //   coloured   sky visibility    red                  green          material ID + blue
 //
-// Sky visibility and environment maps are other effects' and left 0 here. The translucent material's ID is the last one,
-// so that blue fits above it. As the paper suggests, blue is scaled to what is left. Roots are stored, since equal steps
-// of thickness show where it is dark.
+// Sky visibility and the environment map belong to other effects and are 0 here. The ID of the translucent material is
+// the last one, so that blue fits above it; as the paper suggests, blue is scaled to the remaining steps. Square roots
+// of the thickness are stored, since equal steps of the thickness itself would be visible where it is dark.
 //
-// Where materials of a frame differ in their parameters, the lowest bits of the colour, spared, tell which ones a pixel
-// has: one bit each of red and green, or two of grey.
+// Where the materials of a frame have different parameters, the lowest bits of the colour are the number of a pixel's
+// parameters: one bit each of red and green, or two of grey.
 
 import package::units::{Number};
 import package::targets::{RGBA8Unorm};
 
 const TRANSLUCENT: Number = 3.0; // material ID
-const LEFT: Number = 252.0;      // of 255 steps, for blue
+const LEFT: Number = 252.0;      // steps that remain for blue
 
-// A channel whose lowest `bits` are `low`, above which is a number from 0 to 1.
+// The value of a channel whose lowest `bits` are `low` and whose other bits are a number from 0 to 1.
 fn pack(number: Number, low: u32, bits: u32) -> Number {
     return f32((u32(round(number * f32(255u >> bits))) << bits) | low) / 255.0;
 }

@@ -1,29 +1,28 @@
-// Light that has crossed an object, by the direction that it comes from and the local thickness (Barré-Brisebois &
-// Bouchard 2011, "Code").
+// The light that leaves an object after crossing it, by its direction (Barré-Brisebois & Bouchard 2011, "Code").
 
 import package::units::{Number, Position, Direction, Irradiance};
 import package::light::{incident};
 import package::lights::{lights, environment_irradiance};
 
 struct Transport {
-    distortion: Number, // fLTDistortion: how far the normal turns the light that is seen
+    distortion: Number, // fLTDistortion: how much the normal bends the light
     power: Number,      // iLTPower
     scale: Number,      // fLTScale
     ambient: Number,    // fLTAmbient
 }
 
-// fLTDot + fLTAmbient: what of a light in direction w_i leaves towards w_o, but for thickness and attenuation.
+// fLTDot + fLTAmbient: the share of the light from w_i that leaves towards w_o, without thickness and attenuation.
 fn let_out(transport: Transport, w_i: Direction, n: Direction, w_o: Direction) -> Number {
-    let light = w_i + n * transport.distortion; // longer than 1, so that the product may exceed 1 before it saturates
+    let light = w_i + n * transport.distortion; // may be longer than 1: the product below saturates
     return pow(saturate(dot(w_o, -light)), transport.power) * transport.scale + transport.ambient;
 }
 
-// The same of an environment, all of which that reaches the far side counts as if it came from straight behind.
+// The same for the environment: all its light on the far side counts as if it came from straight behind.
 fn let_out_environment(transport: Transport) -> Number {
     return transport.scale + transport.ambient;
 }
 
-// The light of all lights and the environment that leaves x towards w_o, but for albedo and thickness.
+// The light of all lights and the environment that leaves x towards w_o, without albedo and thickness.
 fn light_out(transport: Transport, x: Position, n: Direction, w_o: Direction) -> Irradiance {
     var total = let_out_environment(transport) * environment_irradiance(-n, 1.0);
     for (var i = 0u; i < arrayLength(&lights); i++) {

@@ -1,11 +1,11 @@
-// What the nodes of one height in the octree stand for, from their children.
+// The light of the inner nodes at one height of the octree, from that of their children.
 
 import package::point_cloud::tree::{Node, Entering, brightness, farthest};
 import package::units::{Number, Length};
 
 struct Params {
-    epsilon: Number,  // of Mikkelsen 2009, eq. 42
-    farthest: Length, // beyond which no light arrives
+    epsilon: Number,  // largest ratio of a node's size to its distance (Mikkelsen 2009, eq. 42)
+    farthest: Length, // distance beyond which no light arrives
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -30,11 +30,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         moment += weight * (below.position - node.centre);
         normal += weight * below.normal;
     }
-    let lit = brightness(flux) > 0.0; // nothing comes from a dark node, wherever it is
+    let lit = brightness(flux) > 0.0; // the position of a node without light does not matter
     let weight = select(1.0, brightness(flux), lit);
     let position = node.centre + moment / weight;
     let radius = farthest(node, position);
-    // A node that x_o lies in is never small enough, and one that no light arrives from always is.
+    // A node that contains x_o is never used as a whole; a node too far away for light to arrive always is.
     let reach = min(max(sqrt(node.area) / params.epsilon, radius), params.farthest + radius);
     entering[k] = Entering(position, reach, flux, node.next, normal / weight);
 }

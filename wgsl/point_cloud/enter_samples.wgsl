@@ -1,4 +1,4 @@
-// The flux that enters at the samples: the lowest nodes of the octree.
+// The flux that enters at the samples, which are the leaves of the octree.
 
 import package::mesh::{Vertex};
 import package::point_cloud::tree::{Node, Entering};
@@ -16,6 +16,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let node = nodes[k];
     let flux = irradiance[node.first].rgb * node.area;
-    // The reach of a node that is no sample is set from those below it.
+    // enter_nodes.wgsl then overwrites the inner nodes.
     entering[k] = Entering(points[node.first].position, -1.0, flux, node.next, points[node.first].normal);
 }

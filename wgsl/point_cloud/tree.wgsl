@@ -1,11 +1,11 @@
-// The octree over a body's samples, in object space. A node is a sample or stands for the nodes below it.
+// The octree over a body's samples, in object space. A leaf is a sample; an inner node replaces its descendants.
 
 import package::units::{Position, Direction, Length, Area, Number};
 
-// What a node is by its place, light apart. Its children follow it, the first directly; what comes after all of them
-// is `next`.
+// The geometry of a node. Nodes are in depth-first order: the first child follows its parent, and `next` is the node
+// after all descendants.
 struct Node {
-    low: Position, // the box around its samples
+    low: Position, // with `high`: the box around its samples
     area: Area,
     high: Position,
     next: u32,
@@ -13,16 +13,16 @@ struct Node {
     first: u32,       // the first of its samples
 }
 
-// What a node stands for (Mikkelsen 2009, 3.2), means being weighted by what enters at the samples.
+// The light that enters at the samples of a node (Mikkelsen 2009, 3.2).
 struct Entering {
-    position: Position, // P_k
-    reach: Length,      // the distance below which its children are asked
+    position: Position, // P_k, the mean weighted by flux
+    reach: Length,      // points closer than this sum over the children instead; -1 for a leaf
     flux: vec3f,        // Phi_k, W/m^2 mm^2
-    next: u32,
-    normal: vec3f,      // the mean, the shorter the more the samples' differ
+    next: u32,          // as of the node
+    normal: vec3f,      // the mean weighted by flux: shorter, the more the normals of the samples differ
 }
 
-// By which P_k is weighted: the colours share one.
+// The weight of P_k, which is one for all channels.
 fn brightness(flux: vec3f) -> Number {
     return flux.r + flux.g + flux.b;
 }

@@ -1,7 +1,8 @@
-// One direction of a separable blur over the surface of one object, as it is seen (Jimenez et al. 2015, Separable Subsurface Scattering).
+// One direction of a separable blur over the visible surface of one object (Jimenez et al. 2015, Separable Subsurface
+// Scattering).
 //
-// The first direction runs along the rows of the image, the second at right angles to it on the surface, whatever way
-// that faces. Weights are of whole pixels, by how many of them a millimetre of the surface spans there.
+// The first direction runs along the rows of the image; the second is perpendicular to it on the surface. Taps read
+// single pixels, with weights for the number of pixels that a millimetre of the surface spans there.
 
 import package::units::{Length, Number, Position};
 import package::mesh::{color_after};
@@ -9,56 +10,57 @@ import package::per_object::{view, object, base_color_at};
 import package::targets::{RGBA32Float};
 
 struct Params {
-    scale: vec3f,   // of what comes out of the second direction
-    coarsest: f32,  // pixels per mm of level 0
+    scale: vec3f,   // factor of the result of the second direction
+    coarsest: f32,  // pixels per mm at level 0
 }
 
 override DIRECTION: u32 = 0u; // or 1
 
 struct Tap {
-    weight: vec3f, // of each of the two pixels
-    offset: f32,   // pixels to either side
+    weight: vec3f, // of each of the two pixels that the tap reads
+    offset: f32,   // distance of these two pixels to both sides
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> taps: array<Tap>; // of each level, the one in the middle first
-@group(0) @binding(2) var source: texture_2d<f32>; // alpha: 1 - depth, 0 off the object
-@group(0) @binding(3) var slope: texture_2d<f32>;  // of the depth, per pixel to the right and down
-@group(0) @binding(4) var before: texture_2d<f32>; // M by the kernel's terms so far, or a single black texel
+@group(0) @binding(1) var<storage, read> taps: array<Tap>; // of all levels; the first of each level is that of the middle
+@group(0) @binding(2) var source: texture_2d<f32>; // alpha: 1 - depth, 0 at pixels of other objects
+@group(0) @binding(3) var slope: texture_2d<f32>;  // change of depth per pixel to the right and down
+@group(0) @binding(4) var before: texture_2d<f32>; // M by the kernel's earlier terms, or a single black texel
 
 struct Pixel {
     @location(0) blurred: RGBA32Float, // first direction: as source; second: M in W/m^2
 }
 
-const LEVELS: u32 = 448u; // to where a kernel spans the largest image
-const LEVELS_PER_OCTAVE: u32 = 32u; // it is 1 % too wide or too narrow at most
+const LEVELS: u32 = 448u; // enough for kernels that span the largest image
+const LEVELS_PER_OCTAVE: u32 = 32u; // the kernel's width is off by 1 % at most
 
-// A tap counts in full where the surface has bent away by up to 45 degrees since the tap before it, and not at all from
-// 63 degrees on: this is a step to another surface. Nor does any tap beyond. Their weight goes to the middle, so that
-// uniform light stays uniform.
-const TURN_KEPT: Number = 1.0;
-const TURN_LOST: Number = 2.0;
+// A tap counts fully where the surface bends by up to 45 degrees from the tap before it. From 63 degrees on it is taken
+// to lie on another surface: neither this tap nor those beyond count. The middle pixel replaces them, so that uniform
+// light stays uniform.
+const BEND_KEPT: Number = 1.0; // tangents of these angles
+const BEND_LOST: Number = 2.0;
 
-// A walk from the middle to one side, tap by tap.
+// The state of a traversal from the middle pixel to one side, tap by tap.
 struct Walk {
-    kept: Number,  // how much a tap here counts
-    gone: Length,  // from the middle, were the surface the plane that it is there
-    off: Length,   // how far behind that plane it is
+    weight: Number,  // how much this tap counts, 0 to 1
+    along: Length,   // distance from the middle, along the tangent plane there
+    behind: Length,  // distance of the surface behind that plane
 }
 
-// On to a pixel where source's alpha is `seen`. The way there is in clip space, seen from the middle (`from_middle`):
-// `flat` on the plane, and `rise` by how much the depth differs from its.
-fn walked(walk: Walk, seen: f32, flat: vec4f, rise: f32, away: vec4f, w: f32) -> Walk {
+// Continue to a pixel, given its alpha in `source`. Steps are as `from_middle` returns them: `flat` leads there along
+// the tangent plane, and `away` times `rise`, the difference of depth from the plane's, from there to the surface.
+fn walked(walk: Walk, alpha: f32, flat: vec4f, rise: f32, away: vec4f, w: f32) -> Walk {
     let plane = flat.xyz / (w + flat.w);
-    let way = flat + away * rise;
-    let gone = length(plane);
-    let off = sign(rise) * length(way.xyz / (w + way.w) - plane);
-    let turn = abs(off - walk.off) / max(gone - walk.gone, 1e-9);
-    let kept = select(1.0 - smoothstep(TURN_KEPT, TURN_LOST, turn), 0.0, seen == 0.0);
-    return Walk(min(walk.kept, kept), gone, off);
+    let step = flat + away * rise;
+    let along = length(plane);
+    let behind = sign(rise) * length(step.xyz / (w + step.w) - plane);
+    let bend = abs(behind - walk.behind) / max(along - walk.along, 1e-9);
+    let weight = select(1.0 - smoothstep(BEND_KEPT, BEND_LOST, bend), 0.0, alpha == 0.0);
+    return Walk(min(walk.weight, weight), along, behind);
 }
 
-// A step in clip space turned so that its xyz, over w + its own w, is the way in mm from x, whose clip w is w.
+// Transform a step from the middle pixel to world space. x is the position of the middle and w its clip w; the xyz of
+// the result, divided by w plus the w of the result, is the step in mm.
 fn from_middle(step: vec4f, x: Position) -> vec4f {
     return vec4f(step.xyz - x * step.w, step.w);
 }
@@ -75,7 +77,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let x = here.xyz / here.w;
     let rises = textureLoad(slope, texel, 0).rg;
     let away = from_middle(view.clip_to_world[2], x);
-    let right = from_middle(view.clip_to_world[0] * per_pixel.x, x) + away * rises.x; // pixel by pixel on the plane
+    let right = from_middle(view.clip_to_world[0] * per_pixel.x, x) + away * rises.x; // steps of one pixel along the tangent plane
     let down = from_middle(view.clip_to_world[1] * per_pixel.y, x) + away * rises.y;
     let t_x = right.xyz / here.w; // mm per pixel
     let t_y = down.xyz / here.w;
@@ -93,13 +95,13 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     for (var k = first + 1u; k < first + count; k++) {
         let tap = taps[k];
         let moved = vec2i(round(step * tap.offset));
-        let there = textureLoad(source, texel + moved, 0); // zeros outside of the image
+        let there = textureLoad(source, texel + moved, 0); // 0 outside of the image
         let opposite = textureLoad(source, texel - moved, 0);
         let flat = f32(moved.x) * right + f32(moved.y) * down;
         let rise = dot(vec2f(moved), rises);
         ahead = walked(ahead, there.a, flat, middle.a - there.a - rise, away, here.w);
         back = walked(back, opposite.a, -flat, middle.a - opposite.a + rise, away, here.w);
-        total += tap.weight * (mix(middle.rgb, there.rgb, ahead.kept) + mix(middle.rgb, opposite.rgb, back.kept));
+        total += tap.weight * (mix(middle.rgb, there.rgb, ahead.weight) + mix(middle.rgb, opposite.rgb, back.weight));
     }
     if DIRECTION == 0u {
         return Pixel(vec4f(total, middle.a));

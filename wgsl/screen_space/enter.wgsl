@@ -1,5 +1,5 @@
-// What enters one object at its pixels, and what arrives there from behind as if it did; and which way its surface runs
-// there: the input of the blurs.
+// The input of the blurs: the light that enters one object at its pixels, with the light that arrives there from behind
+// as if it entered, and the slope of the surface.
 
 import package::mesh::{color_before};
 import package::per_object::{view, object, depth, is_other_object, normal_at, base_color_at};
@@ -9,11 +9,11 @@ import package::targets::{RGBA32Float, RG32Float};
 @group(0) @binding(1) var behind: texture_2d<f32>; // or a single black texel
 
 struct Pixel {
-    @location(0) entering: RGBA32Float, // times the base colour's share before diffusion; 1 - depth, 0 off the object
-    @location(1) slope: RG32Float,      // of the depth, per pixel to the right and down: the same all over a plane
+    @location(0) entering: RGBA32Float, // times the share of the base colour before diffusion; alpha: 1 - depth, 0 elsewhere
+    @location(1) slope: RG32Float,      // change of depth per pixel to the right and down, which is constant on a plane
 }
 
-const LEAST_COSINE: f32 = 0.1; // beyond, a pixel spans ten times its width: nothing is left to blur
+const LEAST_COSINE: f32 = 0.1; // at smaller cosines a pixel spans ten times its width, and more, of the surface
 
 @fragment
 fn fs(@builtin(position) pixel: vec4f) -> Pixel {
@@ -29,7 +29,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let right = view.clip_to_world[0] * per_pixel.x;
     let down = view.clip_to_world[1] * per_pixel.y;
     let away = view.clip_to_world[2].xyz - x * view.clip_to_world[2].w;
-    // Steps on the plane through x are those that the normal is at right angles to.
+    // The slope follows from the steps along the tangent plane being perpendicular to the normal.
     let facing = min(dot(n, away), -LEAST_COSINE * length(away));
     let slope = -vec2f(dot(n, right.xyz - x * right.w), dot(n, down.xyz - x * down.w)) / facing;
     let color = color_before(object, base_color_at(texel));

@@ -1,6 +1,6 @@
-// Fills the texels around the charts from where they lie on the surface: across the border, in the chart of the
-// neighbouring triangle (Mikkelsen 2009, 3.4, offsets determined once, applied in a single pass).
-// Its depth buffer is the mask of the passes that follow (wgsl/mask.wgsl).
+// Fill the gutters around the charts with the values at the same points of the surface, across the border in the
+// neighbouring chart (Mikkelsen 2009, 3.4: offsets are determined once and applied in a single pass). The depth buffer
+// is the mask of the passes that follow (mask.wgsl).
 
 import package::charts::{INSIDE, Seam, across, settled};
 import package::mask::{BEHIND, covered_around};
@@ -33,7 +33,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Texel {
         value = textureSampleLevel(source, linear_clamp, home, 0.0);
         covered = value.a + covered_around(source, linear_clamp, home, texel);
     }
-    // Alpha is coverage: beside a border the filter has met texels that nothing has drawn.
+    // Alpha is coverage: next to a border the filter reads empty texels, too.
     let dilated = vec4f(value.rgb / max(value.a, 1e-4), f32(value.a > 0.0));
     return Texel(dilated, select(0.0, BEHIND, id != 0u && covered > 0.0));
 }

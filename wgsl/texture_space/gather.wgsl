@@ -1,4 +1,4 @@
-// M_front of one object at its pixels: its irradiance maps, each blurred by one Gaussian, summed by weight
+// M_front at the pixels of one object: the weighted sum of its irradiance maps, each blurred with one Gaussian
 // (Mikkelsen 2009, 3.4, step 4a).
 
 import package::mesh::{color_after};
@@ -18,9 +18,9 @@ struct Pixel {
     @location(0) M_front: RGBA32Float,
 }
 
-// A map read through the cubic B-spline, as four bilinear lookups. Where a Gaussian spans about a texel, bilinear
-// interpolation alone would miss it by up to a few per cent between the texels; the spline blurs, but equally everywhere,
-// so that the blur before can make up for it. Texels without a value do not count.
+// The value of a map by the cubic B-spline, as four bilinear lookups. With bilinear interpolation alone, a Gaussian
+// about as narrow as a texel would be wrong by a few per cent between the texels. The spline blurs, but equally
+// everywhere, and blur.wgsl subtracts its variance. Texels without a value do not count.
 fn smooth_sample(map: texture_2d<f32>, linear_clamp: sampler, uv: vec2f) -> vec3f {
     let size = vec2f(textureDimensions(map));
     let p = uv * size - 0.5;

@@ -1,4 +1,4 @@
-// The mask of a smaller map (wgsl/mask.wgsl): which of its texels have a value.
+// The mask (mask.wgsl) of a map smaller than the irradiance map.
 
 import package::charts::{INSIDE, Seam, across, settled};
 import package::mask::{BEHIND, covered_around};

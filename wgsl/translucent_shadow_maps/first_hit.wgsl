@@ -1,5 +1,5 @@
-// A translucent shadow map: where a light's rays first meet one object, in space and in its atlas, and the normal there
-// (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009, 3.4).
+// A translucent shadow map: position, normal and atlas coordinates of the point where each ray of a light first hits
+// one object (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009, 3.4).
 
 import package::mesh::{Vertex, ObjectUniforms};
 import package::targets::{RGBA32Float, RG32Float, RGBA16Float};
@@ -20,7 +20,7 @@ struct Varying {
 }
 
 struct Texel {
-    @location(0) x_i: RGBA32Float, // mm, world; 1 where the object is met
+    @location(0) x_i: RGBA32Float, // mm, world; alpha: 1 where the ray hits the object
     @location(1) n_i: RGBA16Float,
     @location(2) atlas: RG32Float,
 }

@@ -1,5 +1,5 @@
-// What each light sends through one object to its pixels, by as much of it as the shadow maps tell (Jimenez et al. 2010,
-// Real-Time Realistic Skin Translucency).
+// The light that each emitter sends through one object to its pixels, by the thickness according to the shadow maps
+// (Jimenez et al. 2010, Real-Time Realistic Skin Translucency).
 
 import package::units::{Length, Number, Position, Direction, Irradiance};
 import package::light::{Light, Incident, incident, layer_towards};
@@ -10,23 +10,23 @@ import package::profile_table::{root_entry};
 import package::targets::{RGBA32Float};
 
 struct Params {
-    shrink: Length,   // how far x_o is moved below the surface where light grazes it
-    reach: Length,    // the thickness that the table ends at: no light goes through more
+    shrink: Length,   // distance by which x_o is moved below the surface where light grazes it
+    reach: Length,    // thickness at the end of the table: no light passes through more
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> through: array<vec3f>; // T over the profile's total, by the square root of the thickness
+@group(0) @binding(1) var<storage, read> through: array<vec3f>; // T / total reflectance (profile_table.wgsl: root_entry)
 
 struct Pixel {
     @location(0) arriving: RGBA32Float, // W/m^2
 }
 
-// The back's irradiance ends where its normal, -n, is this far beyond a right angle to the light: on a real one, which is
-// not parallel to the front, some light arrives there (Jimenez et al. 2010).
+// The back is taken to have the normal -n. It receives light until that normal is this far beyond a right angle to the
+// light, since real backs are not parallel to the front (Jimenez et al. 2010).
 const WRAP: Number = 0.3;
 
-// And further below, in shadow texels per unit of sine. A lookup reaches 1.5 texels to each side: closer to the surface,
-// some would find x_o outside.
+// x_o is moved by this many shadow texels per unit of sine in addition to `shrink`. A lookup reaches 1.5 texels to each
+// side: closer to the surface, x_o would lie outside of the object in some of them.
 const SHRINK_TEXELS: Number = 2.0;
 
 fn transmittance(d: Length) -> vec3f {
@@ -36,15 +36,15 @@ fn transmittance(d: Length) -> vec3f {
     return mix(through[i], through[i + 1u], s - f32(i));
 }
 
-// Weights of three texels by a quadratic B-spline whose middle is `f` texels, -1/2 to 1/2, beyond that of the second.
+// Weights of three texels by a quadratic B-spline centred `f` texels, -1/2 to 1/2, after the middle of the second.
 fn spline(f: f32) -> vec3f {
     let a = 0.5 - f;
     let b = 0.5 + f;
     return vec3f(0.5 * a * a, 0.75 - f * f, 0.5 * b * b);
 }
 
-// How deep x_o is below where the light's rays first meet the scene, along them: of the rays that pass below it, mean over
-// those nearby by weights that keep planes as they are. 0 where they meet nothing.
+// The distance along the light's rays from where they first hit the scene to x_o; 0 where they hit nothing. It is a
+// weighted mean over the rays around x_o, by weights that reproduce planes exactly.
 fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length {
     let first = views[light.first_view];
     let perspective = first.perspective != 0u;
@@ -54,12 +54,14 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
     let below = SHRINK_TEXELS * texel * sine;
     let grazing = params.shrink * sine * sine;
     let x = x_o - n * (below + grazing);
-    // What the light has no longer to go. Of the texels all of it, or thickness would depend on the size of the map.
-    let spared = below / max(-cosine, WRAP) - grazing * cosine;
+    // The part of the distance that moving x_o has cut off is added again: all of it for the shift by texels, so that
+    // the thickness does not depend on the size of the map.
+    let cut_off = below / max(-cosine, WRAP) - grazing * cosine;
     let layer = layer_towards(light, x - light.position);
     let to_clip = views[layer].world_to_clip;
     let clip = to_clip * vec4f(x, 1.0);
-    // Along a ray a parallel view's depth grows evenly; a perspective one's is p + q / w, and w grows evenly.
+    // Along a ray, depth is linear in distance in a parallel view. In a perspective view it is p + q / w, with w
+    // linear.
     let z_row = vec3f(to_clip[0].z, to_clip[1].z, to_clip[2].z);
     let w_row = vec3f(to_clip[0].w, to_clip[1].w, to_clip[2].w);
     let p = dot(z_row, w_row);
@@ -76,10 +78,10 @@ fn thickness(light: Light, at: Incident, x_o: Position, n: Direction) -> Length 
     for (var j = 0; j < 3; j++) {
         for (var i = 0; i < 3; i++) {
             let there = clamp(vec2i(middle) + vec2i(i - 1, j - 1), vec2i(0), vec2i(size) - 1);
-            let met = textureLoad(shadow_maps, there, layer, 0);
-            let parallel = (here - met) * per_depth;
-            let found = select(parallel, distance * (1.0 - q / ((met - p) * clip.w)), perspective);
-            total += across[i] * along[j] * clamp(found + spared, 0.0, params.reach);
+            let hit = textureLoad(shadow_maps, there, layer, 0);
+            let parallel = (here - hit) * per_depth;
+            let distance_inside = select(parallel, distance * (1.0 - q / ((hit - p) * clip.w)), perspective);
+            total += across[i] * along[j] * clamp(distance_inside + cut_off, 0.0, params.reach);
         }
     }
     return total;

@@ -1,4 +1,4 @@
-// Colours at the vertices of one object, between them at its pixels.
+// Draw one object in colours given at its vertices.
 
 import package::mesh::{Vertex, ObjectUniforms};
 import package::targets::{RGBA8UnormSrgb};
@@ -10,7 +10,7 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> object: ObjectUniforms;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> colors: array<vec4f>; // by vertex, linear
+@group(0) @binding(3) var<storage, read> colors: array<vec4f>; // by render vertex, linear
 
 struct Varying {
     @builtin(position) clip: vec4f,

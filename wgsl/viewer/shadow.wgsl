@@ -1,4 +1,4 @@
-// A shadow map as a picture: near is bright.
+// The first shadow map as a picture: points near the light are bright.
 
 import package::screen::{screen_corner};
 import package::targets::{RGBA8UnormSrgb};
