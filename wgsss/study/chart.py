@@ -87,7 +87,7 @@ def _figure(groups: Sequence[Panel]) -> Figure:
         Line2D([], [], ls="--", lw=1.2, label=figure_text(method), **_marker(style(method), is_best=True))
         for method in methods
     ]
-    handles.append(Line2D([], [], color=_FRONT, lw=1.8, label="best for its time"))
+    handles.append(Line2D([], [], color=_FRONT, lw=1.8, label="Pareto front"))
     figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 2 + 3 * columns), frameon=False)
     figure.text(0.1 / size[0], 0.08 / size[1], text, fontsize=8, color=_FAINT)
     figure.draw_without_rendering()  # settles the layout, which the labels need to know

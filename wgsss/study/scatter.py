@@ -211,8 +211,8 @@ def caption(groups: Sequence[Panel]) -> str:
     dates = sorted(run["date"][:10] for run in runs)
     when = dates[0] if dates[0] == dates[-1] else f"{dates[0]} to {dates[-1]}"
     return (
-        f"Time: all passes of a frame by {all_of(run['clock'] for run in runs)}, median and middle half. "
-        f"Error: of M over the object's pixels, against {all_of(run['reference'] for run in runs)}. "
+        f"Time: sum of the passes of a frame by {all_of(run['clock'] for run in runs)}, median and quartiles. "
+        f"Error: over the pixels that show an object, against {all_of(run['reference'] for run in runs)}. "
         f"{all_of(run['adapter'] for run in runs)}; "
         f"{all_of(sizes)} pixels; "
         f"wgsss {all_of(run['version'] for run in runs)}; {when}."
