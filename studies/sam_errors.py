@@ -14,7 +14,7 @@ from wgsss.bake.sam.form_factors import FormFactors
 from wgsss.frame import begin
 from wgsss.gpu import default_gpu
 from wgsss.graph import Graph
-from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.method import SamTranslucency
 from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import converged, irradiance_at
 from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
@@ -42,7 +42,7 @@ class Errors:
 
     def _drawn(self, receivers: int) -> tuple[np.ndarray, np.ndarray]:
         """Draw vertices (k,) and compute the weight of each (k,)."""
-        power = np.square(M_back(self.stages[-1], SpatialAdjacencyMaps(surface="none"))).sum(axis=1, dtype=np.float64)
+        power = np.square(M_back(self.stages[-1], SamTranslucency())).sum(axis=1, dtype=np.float64)
         p = 0.9 * power / max(power.sum(), 1e-30) + 0.1 / len(power)
         drawn = np.random.default_rng(1).choice(len(p), receivers, p=p / p.sum())
         chosen, times = np.unique(drawn, return_counts=True)
@@ -50,7 +50,7 @@ class Errors:
 
     def of(self, select: str, samples: int) -> tuple[float, float]:
         """Compute the relative RMSE of a selection: the mean under the suns, and the value under the sky."""
-        method = SpatialAdjacencyMaps(samples=samples, select=select, surface="none")
+        method = SamTranslucency(samples=samples, select=select)
         return self._relative([M_back(stage, method)[self.chosen] for stage in self.stages], self.truth)
 
     def of_the_sum(self) -> tuple[float, float]:
@@ -88,12 +88,12 @@ def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.nda
     return totals
 
 
-def M_back(stage: Stage, method: SpatialAdjacencyMaps) -> np.ndarray:
+def M_back(stage: Stage, method: SamTranslucency) -> np.ndarray:
     """Render M_back, W/m^2 (V, 3), at the vertices of the first object."""
     graph, body = Graph(stage.gpu), stage.bodies[0]
-    plan = method.plan(body)
-    if plan is None:  # nothing shines through
+    gpu_map = method.gpu_map(body)
+    if gpu_map is None:  # nothing shines through
         return np.zeros((len(body.mesh.positions), 3))
-    values = method.at_vertices(begin(graph, stage, (8, 8)), body, plan)
+    values = method.M_back_at_vertices(begin(graph, stage, (8, 8)), body, gpu_map)
     graph.run(values)
     return graph.read(values)[:, :3]

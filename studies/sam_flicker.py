@@ -18,7 +18,7 @@ from sam_errors import M_back, sums
 from tqdm import tqdm
 
 from wgsss.gpu import default_gpu
-from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.method import SamTranslucency
 from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import irradiance_at
 from wgsss.scene import DirectionalLight, load_scene
@@ -68,7 +68,7 @@ def main(argv: list[str] | None = None) -> None:
     print("map      flicker  of the sum's  off    blended  of the sum's  off")
     print(f"all      {100 * flicker(truth):5.2f} %", flush=True)
     for select, samples in MAPS:
-        method = SpatialAdjacencyMaps(samples=samples, select=select, surface="none")
+        method = SamTranslucency(samples=samples, select=select)
         cells = []
         for blended in (False, True):
             M = frames(f"{select} {samples}", lambda m=method: M_back(stage, m)[chosen], blended=blended)

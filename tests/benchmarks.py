@@ -26,7 +26,7 @@ from wgsss.graph import Graph
 from wgsss.optics import Layer
 from wgsss.reference.integral import integral
 from wgsss.reference.photons import trace
-from wgsss.registry import METHODS, make_method
+from wgsss.registry import METHODS, make_method, sweep_of
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
 from wgsss.study.metrics import errors
@@ -111,8 +111,8 @@ def methods(gpu: Gpu) -> None:
     """A frame by each method over its sweep, against Lambert's."""
     scene = load_scene("ear")
     plain = None
-    for name, kind in METHODS.items():
-        for knobs in kind.sweep:
+    for name in METHODS:
+        for knobs in sweep_of(name):
             start = time.perf_counter()
             renderer = Renderer(scene, make_method(name, knobs), SIZE, gpu)
             baked = time.perf_counter() - start

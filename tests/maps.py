@@ -12,7 +12,7 @@ from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.point_tree import point_tree
 from wgsss.graph import Graph
 from wgsss.methods.sam import method as sam
-from wgsss.methods.sam.method import SpatialAdjacencyMaps
+from wgsss.methods.sam.method import SamTranslucency
 from wgsss.methods.sam.upload import at_vertices
 from wgsss.scene import MATERIALS, DirectionalLight, Mesh, OrthographicCamera
 from wgsss.stage import Stage
@@ -20,7 +20,7 @@ from wgsss.stage import Stage
 MARBLE = replace(MATERIALS["marble"], specular=0.0)
 SIDE = DirectionalLight((-0.7, -0.5, -0.5), (1, 2, 3))
 FRONT = OrthographicCamera((0, 0, 50), (0, 0, 0), height=24)
-PLAIN = SpatialAdjacencyMaps(select="top", surface="none")
+PLAIN = SamTranslucency(select="top")
 
 
 def rms(values: Any) -> float:

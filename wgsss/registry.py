@@ -1,7 +1,8 @@
 """The methods and the references by name.
 
 A new method is a module in `methods/`, its shaders in `wgsl/`, a row of ROWS and its goldens. Each surface method can
-also be combined with each translucency method that fits it: "screen+sam" names such a pair.
+also be combined with each translucency method that fits it: "screen+sam" names such a pair. The knob `surface` of a
+pair replaces its surface method: "sam" with surface=screen is "screen+sam".
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from wgsss.methods.local_thickness import LocalThickness
 from wgsss.methods.method import Method
 from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
-from wgsss.methods.sam.method import SURFACES, Adjacency, SpatialAdjacencyMaps
+from wgsss.methods.sam.method import SamTranslucency
 from wgsss.methods.screen_space import ScreenSpace
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps
@@ -28,11 +29,14 @@ from wgsss.reference.estimate import Reference
 from wgsss.reference.integral import Integral
 from wgsss.reference.volume import Volume
 
+SURFACES: dict[str, type[Method]] = {"texture": TextureSpace, "screen": ScreenSpace, "none": Lambert}
+"""The surface methods, which estimate M_front."""
+
 TRANSLUCENCIES: dict[str, type[Translucency]] = {
     "tsm": TranslucentShadowMaps,
     "transmittance": Transmittance,
     "thickness": LocalThickness,
-    "sam": Adjacency,
+    "sam": SamTranslucency,
 }
 """The translucency methods, which estimate M_back. The name "none" stands for no M_back."""
 
@@ -48,7 +52,15 @@ class Row:
     kind: type[Method]
     place: int
     """Its place in the legends of charts, which chooses its colour and shape. It must never change."""
+    sweep: tuple[dict[str, Any], ...] = ()
+    """Settings for `wgsss bench`, if they are not those of its class."""
 
+
+_SAM_SWEEP: tuple[dict[str, Any], ...] = (
+    *({"surface": "screen", "samples": n} for n in (3, 8)),
+    *({"surface": "texture", "samples": n} for n in (3, 8)),
+    *({"surface": "texture", "select": select} for select in ("top", "coarse")),
+)
 
 ROWS = (
     Row("lambert", Lambert, place=0),
@@ -57,7 +69,7 @@ ROWS = (
     Row("jimenez15", pair(ScreenSpace, Transmittance), place=4),
     Row("barre11", pair(Lambert, LocalThickness), place=6),
     Row("jensen02", PointCloud, place=3),
-    Row("sam", SpatialAdjacencyMaps, place=2),
+    Row("sam", pair(TextureSpace, SamTranslucency), place=2, sweep=_SAM_SWEEP),
 )
 
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
@@ -96,10 +108,21 @@ def kind_of(name: str) -> type[Method]:
 def make_method(name: str, knobs: Mapping[str, Any] | None = None) -> Method:
     """Return a method, a pair or a reference with its knobs set.
 
+    The knob `surface` of a pair replaces its surface method: "sam" with surface=screen is "screen+sam".
+
     Raises InputError for an unknown name or knob, and for a value that the knob does not allow.
     """
-    kind = kind_of(name)
-    return kind(**parsed(name, kind, knobs or {}))
+    kind, values = kind_of(name), dict(knobs or {})
+    pair_name = pair_of(kind)
+    if pair_name is not None and "surface" in values:
+        name = f"{values.pop('surface')}+{pair_name.partition('+')[2]}"
+        kind = kind_of(name)
+    return kind(**parsed(name, kind, values))
+
+
+def sweep_of(name: str) -> tuple[dict[str, Any], ...]:
+    """Return the settings at which `wgsss bench` measures a method or a pair: knobs for `make_method`."""
+    return next((row.sweep for row in ROWS if row.name == name and row.sweep), kind_of(name).sweep)
 
 
 def name_of(method: Method) -> str:
@@ -144,7 +167,7 @@ def colour_of(name: str) -> str:
         return _UNKNOWN
     base = _SURFACE_ALONE
     for row in ROWS:
-        if translucency in (row.name, (pair_of(row.kind) or "").partition("+")[2]):
+        if translucency == (pair_of(row.kind) or "").partition("+")[2]:
             base = colour_of(row.name)
     shade = _SHADES[list(SURFACES).index(surface)]
     return "#" + "".join(f"{round(shade * int(base[i : i + 2], 16)):02X}" for i in (1, 3, 5))
@@ -160,6 +183,9 @@ def _check() -> None:
         for name, kind in kinds.items():
             for part in kind.parts if issubclass(kind, Pair) else (kind,):
                 check_declaration(name, part)
+    for row in ROWS:
+        for setting in row.sweep:
+            make_method(row.name, setting)
 
 
 _check()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wgsss.gpu import Gpu
-from wgsss.methods.sam.method import Adjacency
+from wgsss.methods.sam.method import SamTranslucency
 from wgsss.registry import make_method
 from wgsss.scene import load_scene
 from wgsss.stage import Stage
@@ -20,7 +20,7 @@ def stage(gpu: Gpu) -> Stage:
     return Stage(gpu, load_scene("slab", vertices=300))
 
 
-def sam_of(name: str, knobs: dict[str, Any]) -> Adjacency:
+def sam_of(name: str, knobs: dict[str, Any]) -> SamTranslucency:
     sam = find_sam(make_method(name, knobs))
     assert sam is not None
     return sam
@@ -28,7 +28,7 @@ def sam_of(name: str, knobs: dict[str, Any]) -> Adjacency:
 
 def test_lines_to_vertices_reach_the_far_side_with_the_weights_of_the_map(stage: Stage) -> None:
     sam, body = sam_of("screen+sam", {"select": "top", "samples": 4}), stage.bodies[0]
-    sender_map, mesh = sam.map(body), body.rest.mesh
+    sender_map, mesh = sam.sender_map(body), body.rest.mesh
     vertex = int(np.argmax(sender_map.weight.sum(axis=(1, 2))))
     lines = sender_lines(stage, sam, body.rest.placed[vertex] + 1e-4)
     np.testing.assert_allclose(lines.vertex, body.rest.placed[vertex])
@@ -40,7 +40,7 @@ def test_lines_to_vertices_reach_the_far_side_with_the_weights_of_the_map(stage:
 
 def test_line_to_a_mean_over_vertices_ends_among_them(stage: Stage) -> None:
     sam, body = sam_of("sam", {"select": "fit"}), stage.bodies[0]
-    sender_map = sam.map(body)
+    sender_map = sam.sender_map(body)
     assert sender_map.tree is not None
     assert sender_map.smoothed_means is not None and sender_map.neighbour_mixture is not None
     vertex, slot = np.argwhere(sender_map.sender[: len(sender_map.neighbour_mixture.row)] >= sender_map.sender_count)[0]
@@ -53,7 +53,7 @@ def test_line_to_a_mean_over_vertices_ends_among_them(stage: Stage) -> None:
 
 def test_lines_of_a_vertex_that_mixes_rows_are_those_of_all_its_rows(stage: Stage) -> None:
     sam, body = sam_of("sam", {"select": "fit"}), stage.bodies[0]
-    sender_map = sam.map(body)
+    sender_map = sam.sender_map(body)
     mixture = sender_map.neighbour_mixture
     assert mixture is not None
     row_sums = mixture.apply(sender_map.weight.sum(axis=1)).mean(axis=1)

@@ -1,4 +1,4 @@
-// M_back at the pixels: that at the vertices, between them.
+// M_back of each pixel, interpolated between the vertices of the triangle that it shows.
 
 import package::mesh::{Vertex, ObjectUniforms, color_after};
 import package::screen::{is_hidden};
@@ -10,8 +10,8 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> object: ObjectUniforms;
-@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> M_back_at: array<vec4f>; // by vertex of the welded topology
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>; // of the render mesh
+@group(0) @binding(3) var<storage, read> vertex_M_back: array<vec4f>; // W/m^2, by vertex of the mesh
 @group(0) @binding(4) var gbuffer_id: texture_2d<f32>;
 @group(0) @binding(5) var base_color: texture_2d<f32>;
 @group(0) @binding(6) var depth: texture_depth_2d;
@@ -29,7 +29,7 @@ struct Pixel {
 fn vs(@builtin(vertex_index) i: u32) -> Varying {
     let vertex = vertices[i];
     let x = object.object_to_world * vec4f(vertex.position, 1.0);
-    return Varying(params.world_to_clip * x, M_back_at[vertex.welded].rgb);
+    return Varying(params.world_to_clip * x, vertex_M_back[vertex.welded].rgb);
 }
 
 @fragment

@@ -76,7 +76,7 @@ def bench(
 
 def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[RunSpec]:
     """Return what to measure in a scene, each setting once."""
-    from wgsss.registry import METHODS, REFERENCES, kind_of, make_method
+    from wgsss.registry import METHODS, REFERENCES, make_method, sweep_of
     from wgsss.study.bench_run import RunSpec
     from wgsss.study.measurement import knobs_of
     from wgsss.study.provenance import scene_digest
@@ -88,9 +88,9 @@ def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], r
         raise unknown("reference", reference, REFERENCES)
     digest = scene_digest(scene)
     return [
-        RunSpec(scene.name, digest, method, knobs_of(make_method(method, knobs)), step, size, reference)
+        RunSpec(scene.name, digest, method, knobs_of(make_method(method, knobs)) | knobs, step, size, reference)
         for method in dict.fromkeys(methods or METHODS)
-        for step, knobs in enumerate(kind_of(method).sweep)
+        for step, knobs in enumerate(sweep_of(method))
     ]
 
 

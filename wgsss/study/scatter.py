@@ -186,7 +186,8 @@ def labels(runs: Sequence[Run]) -> list[str]:
 
 
 def _varying_knobs(runs: Sequence[Run]) -> list[str]:
-    return [knob for knob in runs[0]["knobs"] if len({repr(run["knobs"].get(knob)) for run in runs}) > 1]
+    shared = [knob for knob in runs[0]["knobs"] if all(knob in run["knobs"] for run in runs)]
+    return [knob for knob in shared if len({repr(run["knobs"][knob]) for run in runs}) > 1]
 
 
 def setting_text(method: str, knobs: dict[str, Knob]) -> str:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from wgsss.methods import Method
 from wgsss.methods.pair import Pair
-from wgsss.methods.sam.deform import places_at_rest
-from wgsss.methods.sam.method import Adjacency
+from wgsss.methods.sam.method import SamTranslucency
+from wgsss.methods.sam.rest_state import clusters_at_rest
 from wgsss.stage import Stage
 
 Array = npt.NDArray[Any]
@@ -29,21 +29,21 @@ class SenderLines:
     """(n,): mean of the three channels"""
 
 
-def find_sam(method: Method) -> Adjacency | None:
+def find_sam(method: Method) -> SamTranslucency | None:
     """Return the part of a method that uses spatial adjacency maps; None: it has no such part."""
     if isinstance(method, Pair):
-        return next((part for part in method.made() if isinstance(part, Adjacency)), None)
-    return method if isinstance(method, Adjacency) else None
+        return next((part for part in method.instances() if isinstance(part, SamTranslucency)), None)
+    return method if isinstance(method, SamTranslucency) else None
 
 
-def sender_lines(stage: Stage, sam: Adjacency, point: npt.ArrayLike) -> SenderLines:
+def sender_lines(stage: Stage, sam: SamTranslucency, point: npt.ArrayLike) -> SenderLines:
     """Return the lines of the vertex nearest to a point, world mm.
 
     If the map mixes rows of entries, the lines are those of all rows that the vertex mixes, with their shares.
     """
     index, vertex = _nearest_vertex(stage, point)
     body = stage.bodies[index]
-    sender_map, matrix = sam.map(body), body.rest.matrix
+    sender_map, matrix = sam.sender_map(body), body.rest.matrix
     mixture, means = sender_map.neighbour_mixture, sender_map.smoothed_means
     rows, shares = np.array([vertex]), np.ones((1, 3))
     if mixture is not None:
@@ -55,8 +55,10 @@ def sender_lines(stage: Stage, sam: Adjacency, point: npt.ArrayLike) -> SenderLi
     if means is not None:  # a smoothed mean stands where its first node does
         node = means.node[np.maximum(sender - sender_map.sender_count, 0), 0]
         sender = np.where(sender < sender_map.sender_count, sender, sender_map.sender_count + node)
-    positions = stage.shared(("places", id(sender_map)), lambda: places_at_rest(body.rest.mesh, sender_map)["position"])
-    senders = positions[sender] @ matrix[:3, :3].T + matrix[:3, 3]
+    positions = stage.shared(
+        ("clusters at rest", id(sender_map)), lambda: clusters_at_rest(body.rest.mesh, sender_map)["position"]
+    )
+    senders = clusters["position"][sender] @ matrix[:3, :3].T + matrix[:3, 3]
     return SenderLines(body.rest.placed[vertex], senders, weights)
 
 

@@ -1,1 +1,1 @@
-"""Spatial Adjacency Maps (Maisch & Ropinski 2017) as a method: upload, deformation, sum."""
+"""M_back by Spatial Adjacency Maps (Maisch & Ropinski 2017): upload of baked maps, deforming meshes, and the passes."""

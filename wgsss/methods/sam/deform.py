@@ -1,175 +1,113 @@
-"""Spatial adjacency maps of meshes that deform (Maisch & Ropinski 2017, 3.4): the form factors of senders follow areas
-and distances, and senders give way to better neighbours. For maps of nodes see `sam_sum`.
+"""Sender maps of meshes that deform (Maisch & Ropinski 2017, section 3.4): form factors follow areas and distances.
 
-What drifts is which parts of the far side count more, since senders only climb to better neighbours. It does not add up
-over time: as the rest pose comes back, so do the senders and weights that were baked for it.
+An entry moves on to a neighbour of its sender that has a larger form factor. Such moves are local, so after a while the
+entries may miss the parts of the back side that matter most. This does not accumulate: when the rest pose comes back,
+so do the baked senders and weights. Maps without entries, which have only a tree, are in `barnes_hut`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wgsss import wgsl
 from wgsss.bake.sam import SenderMap
-from wgsss.bake.sam.fans import fan_areas, one_ring
-from wgsss.graph import Graph
-from wgsss.methods.sam.upload import Plan, over_nodes
-from wgsss.optics.lookup import log_table
+from wgsss.bake.sam.fans import one_ring
+from wgsss.gpu import Buffer
+from wgsss.graph import Graph, Handle
+from wgsss.methods.sam.rest_state import clusters_at_rest, rest_state
+from wgsss.methods.sam.tree_nodes import node_clusters
+from wgsss.methods.sam.upload import GpuSenderMap
 from wgsss.scene import Mesh
 from wgsss.stage import Body
 
 Array = npt.NDArray[Any]
 
-_TABLE = 1024
-_NEIGHBOURS = 6  # of a sample
-_NEAREST, _FARTHEST = 1e-4, 4.0  # of the table, in diagonals of the mesh: 0.1 % apart or less where R_d counts
+_NEIGHBOURS = 6  # of a sender that is no vertex
 
 
-@dataclass(frozen=True, eq=False)
-class Deforming:
-    """What follows a mesh that deforms, on the device."""
+@dataclass(frozen=True)
+class PosedClusters:
+    """The clusters of a map as posed."""
 
-    rest: Any
-    """buffer of array<Place> (wgsl/sam/place.wgsl): senders, nodes and receivers at rest"""
-    starts: Any
-    """buffer of u32: where the triangles of each of the map's points begin in `corners`"""
-    corners: Any
-    """buffer of u32: points, three to a triangle"""
-    table: Any
-    """buffer of vec4f: log2 of R_d"""
-    low: float
-    """log2 of the first squared distance of the table, mm^2"""
-    steps: float
-    """of the table, each time that squared distances double"""
+    clusters: Handle
+    """array<Cluster> (wgsl/sam/cluster.wgsl): of the points, then of the tree's nodes"""
+    area: Handle
+    """f32: the areas of the points' fans, mm^2"""
 
 
-def deforming(body: Body, plan: Plan) -> Deforming:
-    """What a body's map needs to follow its motion, uploaded once."""
+def posed_clusters(graph: Graph, body: Body, gpu_map: GpuSenderMap, points: Buffer) -> PosedClusters:
+    """Compute the clusters of a body's map as posed.
 
-    def make() -> Deforming:
-        gpu, mesh = body.stage.gpu, body.rest.mesh
-        layout = wgsl.load("sam/fans").layout("array<Place>")
-        starts, corners = _triangles(mesh, plan.entries)
-        diagonal = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
-        low, steps, table = log_table(body.material.profile, _NEAREST * diagonal, _FARTHEST * diagonal, _TABLE)
-        return Deforming(
-            gpu.buffer(layout.pack(places_at_rest(mesh, plan.entries))),
-            gpu.buffer(starts.astype(np.uint32)),
-            gpu.buffer(corners.astype(np.uint32)),
-            gpu.buffer(table.astype(np.float32)),
-            low,
-            steps,
+    Args:
+        points: array<Vertex>: the map's points as posed.
+    """
+    state = rest_state(body, gpu_map)
+    size = len(gpu_map.points.face) + gpu_map.node_count
+    fans = graph.dispatch_outputs("sam/fans", size=size, points=points, starts=state.starts, corners=state.corners)
+    return PosedClusters(node_clusters(graph, gpu_map, fans.clusters), fans.area)
+
+
+def update_form_factors(
+    graph: Graph, body: Body, gpu_map: GpuSenderMap, points: Buffer, *, restart: bool
+) -> list[Handle]:
+    """Compute the entries of a body's map as posed: array<Entry>, one buffer for each block of entries.
+
+    The map must not have a tree.
+
+    Args:
+        points: array<Vertex>: the map's points as posed.
+        restart: start from the senders at rest instead of those of the last frame.
+    """
+    sender_map, state = gpu_map.sender_map, rest_state(body, gpu_map)
+    neighbours = body.stage.shared(
+        ("neighbours", id(gpu_map)), lambda: body.stage.gpu.buffer(_sender_neighbours(body.rest.mesh, sender_map))
+    )
+    params = {
+        "low": state.low,
+        "steps": state.steps,
+        "entries_per_row": sender_map.sender.shape[1],
+        "first_receiver": 0 if sender_map.sender_samples is None else sender_map.sender_count,
+        "restart": restart,
+        "equal_areas": sender_map.sender_samples is not None,
+    }
+    clusters = posed_clusters(graph, body, gpu_map, points).clusters
+    return [
+        graph.dispatch(
+            "sam/update_form_factors",
+            size=(block.row_count, sender_map.sender.shape[1]),
+            params=params,
+            vertices=block.rows,
+            rest_entries=block.entries,
+            current=block.current_senders,
+            clusters=clusters,
+            rest_clusters=state.clusters,
+            neighbours=neighbours,
+            table=state.table,
         )
+        for block in gpu_map.entry_blocks
+    ]
 
-    found: Deforming = body.stage.shared(("deforming", id(plan)), make)
-    return found
 
+def _sender_neighbours(mesh: Mesh, sender_map: SenderMap) -> Array:
+    """Return the neighbours of each of S senders, uint32 (S + 1 + k,).
 
-def _neighbours(mesh: Mesh, entries: SenderMap) -> Array:
-    """uint32: where each sender's neighbours begin, and the end, then those: of a sample the nearest on its side."""
-    if entries.sender_samples is None:
-        next_to = one_ring(mesh)
-        start, found = next_to.start, next_to.vertex
+    The first S + 1 elements are the index, in this array, of each sender's first neighbour, and the end; the other k
+    are the neighbours. Those of a vertex are its one-ring; those of another sender are the nearest senders whose
+    normals differ by less than a right angle.
+    """
+    if sender_map.sender_samples is None:
+        ring = one_ring(mesh)
+        start, neighbours = ring.start, ring.vertex
     else:
         from scipy.spatial import KDTree
 
-        rest = places_at_rest(mesh, entries)
-        x, n = (rest[name][: entries.sender_count] for name in ("position", "normal"))
+        clusters = clusters_at_rest(mesh, sender_map)
+        x, n = (clusters[name][: sender_map.sender_count] for name in ("position", "normal"))
         k = min(_NEIGHBOURS + 1, len(x))
-        near = KDTree(x).query(x, k=[*range(1, k + 1)])[1]
-        beside = (near != np.arange(len(x))[:, None]) & (np.einsum("sd,skd->sk", n, n[near]) > 0.0)
-        start, found = np.append(0, np.cumsum(beside.sum(axis=1))), near[beside]
-    return np.concatenate([start + len(start), found]).astype(np.uint32)
-
-
-def places_at_rest(mesh: Mesh, entries: SenderMap) -> dict[str, Array]:
-    """The fields of struct Place for a map's senders, its nodes, and its receivers where those are no senders."""
-    positions, normals = mesh.positions.astype(np.float64), mesh.normals
-    samples = entries.sender_samples
-    if samples is not None:
-        corners = mesh.faces[samples.face]
-        position = np.einsum("nk,nkd->nd", samples.barycentric, positions[corners])
-        normal = np.einsum("nk,nkd->nd", samples.barycentric, normals[corners])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        size = np.linalg.norm(mesh.face_normals[samples.face], axis=1) / 6.0
-        positions, normals = np.concatenate([position, positions]), np.concatenate([normal, normals])
-        area = np.concatenate([size, np.zeros(len(mesh.positions))])
-    else:
-        area = fan_areas(mesh)
-    found = {"position": positions, "area": area, "normal": normals, "variance": np.zeros(len(area))}
-    tree, end = entries.tree, entries.sender_count
-    if tree is None:
-        return found
-    weight = np.maximum(area[:end], 1e-20)
-    sums = tree.sums(weight)
-    middle = tree.sums(positions[:end] * weight[:, None]) / sums[:, None]
-    square = tree.sums(np.square(positions[:end]).sum(axis=1) * weight) / sums
-    variance = np.maximum(square - np.square(middle).sum(axis=1), 0.0)
-    normal = tree.sums(normals[:end] * weight[:, None]) / sums[:, None]
-    nodes = {"position": middle, "area": sums, "normal": normal, "variance": variance}
-    return {name: np.concatenate([found[name][:end], nodes[name], found[name][end:]]) for name in found}
-
-
-def _triangles(mesh: Mesh, entries: SenderMap) -> tuple[Array, Array]:
-    """The triangles around a map's points: where they begin (n + 1,) among corners (k,), which are points."""
-    if entries.sender_samples is None:
-        order = np.argsort(mesh.faces.ravel(), kind="stable")
-        count = np.bincount(mesh.faces.ravel(), minlength=len(mesh.positions))
-        faces = mesh.faces[order // 3]
-    else:
-        count = np.repeat([1, 0], [entries.sender_count, len(mesh.positions)])
-        faces = mesh.faces[entries.sender_samples.face] + entries.sender_count
-    return 3 * np.append(0, np.cumsum(count)), faces.ravel()
-
-
-def posed(graph: Graph, body: Body, plan: Plan, points: Any) -> SimpleNamespace:
-    """Where a map's points are and, behind them, its nodes, and the areas of the points' fans: `places` and `area`.
-
-    `points`: a buffer of array<Vertex>, the plan's points as posed.
-    """
-    held = deforming(body, plan)
-    size = len(plan.points.face) + plan.nodes
-    found = graph.dispatch_outputs("sam/fans", size=size, points=points, starts=held.starts, corners=held.corners)
-    return SimpleNamespace(places=over_nodes(graph, plan, "sam/places", "places", places=found.places), area=found.area)
-
-
-def follow(graph: Graph, body: Body, plan: Plan, points: Any, *, anew: bool) -> list[Any]:
-    """The entries of a body as posed, by block, where their senders are no nodes.
-
-    Args:
-        points: a buffer of array<Vertex>: the plan's points as posed.
-        anew: from the senders at rest, and not from those of the last frame.
-    """
-    entries, held = plan.entries, deforming(body, plan)
-    adjacency = body.stage.shared(
-        ("adjacency", id(plan)), lambda: body.stage.gpu.buffer(_neighbours(body.rest.mesh, entries))
-    )
-    params = {
-        "low": held.low,
-        "steps": held.steps,
-        "samples": entries.sender.shape[1],
-        "receivers": 0 if entries.sender_samples is None else entries.sender_count,
-        "anew": anew,
-        "even": entries.sender_samples is not None,
-    }
-    places = posed(graph, body, plan, points).places
-    return [
-        graph.dispatch(
-            "sam/update",
-            size=(block.count, entries.sender.shape[1]),
-            params=params,
-            vertices=block.rows,
-            at_rest=block.entries,
-            moved=block.moved,
-            places=places,
-            rest=held.rest,
-            adjacency=adjacency,
-            table=held.table,
-        )
-        for block in plan.blocks
-    ]
+        nearest = KDTree(x).query(x, k=[*range(1, k + 1)])[1]
+        accepted = (nearest != np.arange(len(x))[:, None]) & (np.einsum("sd,skd->sk", n, n[nearest]) > 0.0)
+        start, neighbours = np.append(0, np.cumsum(accepted.sum(axis=1))), nearest[accepted]
+    return np.concatenate([start + len(start), neighbours]).astype(np.uint32)

@@ -1,5 +1,4 @@
-"""What a frame needs of a spatial adjacency map: the vertices that receive, the senders that they read, and means over
-the nodes of a tree of senders."""
+"""The upload of a Spatial Adjacency Map: the buffers that a frame reads."""
 
 from __future__ import annotations
 
@@ -15,186 +14,199 @@ from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.sender_map import ENTRY_BYTES, MIXTURE_BYTES, NeighbourMixture, SmoothedMeans
 from wgsss.bake.samples import Samples
-from wgsss.gpu import LIMITS, Gpu
-from wgsss.graph import Graph
+from wgsss.gpu import LIMITS, Buffer, Gpu
 from wgsss.scene import Mesh
 
 Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """As many entries as fit in a binding, on the device."""
+class EntryBlock:
+    """Some rows of entries, as many as fit into one storage binding."""
 
-    count: int
-    """of the rows that they are in"""
-    rows: Any
-    """buffer of u32: those"""
-    entries: Any
-    """buffer of array<Entry> (wgsl/sam/entries.wgsl)"""
-    moved: Any
-    """buffer of i32: the senders that they have, from frame to frame, where they may change"""
-
-
-@dataclass(frozen=True, eq=False)
-class Mixes:
-    """As many mixtures as fit in a binding, on the device."""
-
-    count: int
-    """of the vertices that they belong to"""
-    vertices: Any
-    """buffer of u32: those"""
-    mixes: Any
-    """buffer of array<Mix> (wgsl/sam/mix.wgsl)"""
+    row_count: int
+    rows: Buffer
+    """u32: the indices of the rows"""
+    entries: Buffer
+    """array<Entry> (wgsl/sam/sender_map.wgsl), one row after the other"""
+    current_senders: Buffer
+    """i32: the senders of the entries in the last frame, for meshes that deform"""
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """A map, less what nobody sends or receives."""
+class MixtureBlock:
+    """The mixtures of some vertices, as many as fit into one storage binding."""
 
-    entries: SenderMap
+    vertex_count: int
+    vertices: Buffer
+    """u32: the indices of the vertices"""
+    mixtures: Buffer
+    """array<Mixture> (wgsl/sam/neighbour_mixture.wgsl)"""
+
+
+@dataclass(frozen=True, eq=False)
+class GpuTree:
+    """The tree over the senders of a map, and the areas that weight means over its nodes."""
+
+    leaf_starts: Buffer
+    """u32: the index in `order` of the first sender of each node of the finest level, and the end"""
+    order: Buffer
+    """u32: the senders, as indices of points, in the order of the tree"""
+    area: Buffer
+    """f32: the areas of the points' reduced fans at rest, mm^2"""
+
+
+@dataclass(frozen=True, eq=False)
+class GpuSenderMap:
+    """A sender map on the GPU, without the senders that no entry reads and the vertices that receive nothing.
+
+    Its points are the senders that are read. Entries name them by their index among the points. Nodes of the tree, or
+    the smoothed means over them where the map has any, have the indices behind those of the points.
+    """
+
+    sender_map: SenderMap
     points: Samples
-    """what L_d is wanted at: the senders that count, in whose order entries name them; nodes follow"""
-    blocks: list[Block]
-    faces: Any
-    """buffer of u32: the corners of the faces that receive"""
-    mixes: list[Mixes]
-    """where there is a mix"""
-    starts: Any = None
-    """buffer of u32, where there is a tree: where the senders of the finest nodes begin in `order`, and the end"""
-    order: Any = None
-    """buffer of u32, where there is a tree: senders"""
-    area: Any = None
-    """buffer of f32, where there is a tree: of the senders' reduced fans at rest, mm^2"""
-    blends: Any = None
-    """buffer of array<Blend> (wgsl/sam/blends.wgsl), where there is a tree"""
+    """where a frame computes L_d"""
+    entry_blocks: list[EntryBlock]
+    receiving_faces: Buffer
+    """u32: the render vertices of the faces with a vertex that receives light, three for each face"""
+    mixture_blocks: list[MixtureBlock]
+    """empty if the map has no mixtures"""
+    tree: GpuTree | None = None
+    smoothed_means: Buffer | None = None
+    """array<SmoothedMean> (wgsl/sam/smoothed_means.wgsl)"""
 
     @property
-    def nodes(self) -> int:
-        """How many there are."""
-        return 0 if self.entries.tree is None else len(self.entries.tree.first)
+    def node_count(self) -> int:
+        """The number of nodes of the tree; 0 without a tree."""
+        return 0 if self.sender_map.tree is None else len(self.sender_map.tree.first)
+
+    @property
+    def smoothed_count(self) -> int:
+        """The number of smoothed means."""
+        return 0 if self.sender_map.smoothed_means is None else len(self.sender_map.smoothed_means.node)
 
 
-def make_plan(gpu: Gpu, mesh: Mesh, faces: Array, entries: SenderMap, *, moving: bool) -> Plan | None:
-    """Upload what a frame needs of the map of `mesh`, whose render mesh has `faces` (F, 3); None where nobody receives.
+def upload(gpu: Gpu, mesh: Mesh, faces: Array, sender_map: SenderMap, *, deforms: bool) -> GpuSenderMap | None:
+    """Upload the map of a mesh; None: no vertex receives anything.
 
-    Where it is `moving`, all senders count, since entries may come to read others; receivers that are no senders follow
-    them among the points.
+    Args:
+        mesh: the mesh at rest.
+        faces: (F, 3), the faces of its render mesh.
+        deforms: whether the mesh deforms. Its entries may then come to read any sender, so all senders are points, and
+            if the senders are no vertices, the vertices follow them as points.
     """
-    gathers, V = entries.sender.max(axis=1) >= 0, len(mesh.positions)
-    rows, receives, tree = np.flatnonzero(gathers), gathers[:V], entries.tree
+    has_entries, V = sender_map.sender.max(axis=1) >= 0, len(mesh.positions)
+    rows, receives, tree = np.flatnonzero(has_entries), has_entries[:V], sender_map.tree
     if not len(rows):
         return None
-    needed = np.arange(entries.sender_count) if moving else _needed(entries)
-    samples = at_vertices(mesh) if entries.sender_samples is None else entries.sender_samples
-    points = Samples(samples.face[needed], samples.barycentric[needed], samples.share[needed])
-    if moving and entries.sender_samples is not None:
-        points = _joined(points, at_vertices(mesh))
-    means = (
-        0 if tree is None else len(tree.first) if entries.smoothed_means is None else len(entries.smoothed_means.node)
-    )
-    places = np.full(entries.sender_count, -1, np.int32)
-    places[needed] = np.arange(len(needed))
-    named = np.concatenate([places, len(points.face) + np.arange(means), [-1]])  # of no sender, -1, is the last
-    blocks = _blocks(gpu, rows, named[entries.sender[rows]], entries.weight[rows])
-    corners = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
-    mixes = [] if entries.neighbour_mixture is None else _mixes(gpu, rows[rows < V], entries.neighbour_mixture)
+    read = np.arange(sender_map.sender_count) if deforms else _senders_read(sender_map)
+    samples = at_vertices(mesh) if sender_map.sender_samples is None else sender_map.sender_samples
+    points = Samples(samples.face[read], samples.barycentric[read], samples.share[read])
+    if deforms and sender_map.sender_samples is not None:
+        points = _concatenated(points, at_vertices(mesh))
+    means = 0 if tree is None else len(tree.first)
+    if sender_map.smoothed_means is not None and tree is not None:
+        means = len(sender_map.smoothed_means.node)
+    point_of = np.full(sender_map.sender_count, -1, np.int32)
+    point_of[read] = np.arange(len(read))
+    # By sender, then by mean; the last element is for the sender -1 of unused entries.
+    index_of = np.concatenate([point_of, len(points.face) + np.arange(means), [-1]])
+    entry_blocks = _entry_blocks(gpu, rows, index_of[sender_map.sender[rows]], sender_map.weight[rows])
+    receiving_faces = gpu.buffer(faces[receives[mesh.faces].any(axis=1)].astype(np.uint32))
+    mixture = sender_map.neighbour_mixture
+    mixture_blocks = [] if mixture is None else _mixture_blocks(gpu, rows[rows < V], mixture)
     if tree is None:
-        return Plan(entries, points, blocks, corners, mixes)
-    finest = tree.first[: tree.levels[1]]
-    return Plan(
-        entries,
+        return GpuSenderMap(sender_map, points, entry_blocks, receiving_faces, mixture_blocks)
+    leaf_starts = np.append(tree.first[: tree.levels[1]], len(tree.order))
+    # A sender that is no point has the index -1. No node that is read is above it, so any index will do.
+    order = np.maximum(point_of[tree.order], 0)
+    return GpuSenderMap(
+        sender_map,
         points,
-        blocks,
-        corners,
-        mixes,
-        gpu.buffer(np.append(finest, len(tree.order)).astype(np.uint32)),
-        gpu.buffer(np.maximum(places[tree.order], 0).astype(np.uint32)),  # what is not needed is in no mean that is
-        gpu.buffer(fan_areas(mesh)[needed].astype(np.float32)),
-        None if entries.smoothed_means is None else _blends(gpu, entries.smoothed_means),
+        entry_blocks,
+        receiving_faces,
+        mixture_blocks,
+        GpuTree(
+            gpu.buffer(leaf_starts.astype(np.uint32)),
+            gpu.buffer(order.astype(np.uint32)),
+            gpu.buffer(fan_areas(mesh)[read].astype(np.float32)),
+        ),
+        None if sender_map.smoothed_means is None else _smoothed_means(gpu, sender_map.smoothed_means),
     )
 
 
 def at_vertices(mesh: Mesh) -> Samples:
-    """The vertices of a mesh as samples of it; where normals split one, it counts as part of one of its sides."""
+    """Return the V vertices of a mesh as samples of its surface.
+
+    A vertex is a corner of the first face that has it. If normals split it, it has the normal of that face's side. A
+    vertex without faces has no fan, so nothing reads it: it is put on the first face.
+    """
     used, first = np.unique(mesh.faces, return_index=True)
-    corner = np.zeros(len(mesh.positions), np.int64)  # what no face has is sent to nobody, and may be anywhere
+    corner = np.zeros(len(mesh.positions), np.int64)
     corner[used] = first
     return Samples((corner // 3).astype(np.int32), np.eye(3)[corner % 3], np.zeros(len(corner)))
 
 
-def _joined(*parts: Samples) -> Samples:
-    return Samples(*(np.concatenate([vars(s)[name] for s in parts]) for name in ("face", "barycentric", "share")))
+def _concatenated(first: Samples, second: Samples) -> Samples:
+    return Samples(
+        np.concatenate([first.face, second.face]),
+        np.concatenate([first.barycentric, second.barycentric]),
+        np.concatenate([first.share, second.share]),
+    )
 
 
-def _needed(entries: SenderMap) -> Array:
-    """The senders that are read, by themselves or in a mean."""
-    is_read = np.zeros(entries.sender_count, bool)
-    is_read[entries.sender[(entries.sender >= 0) & (entries.sender < entries.sender_count)]] = True
-    tree = entries.tree
+def _senders_read(sender_map: SenderMap) -> Array:
+    """Return the indices of the senders that entries read, by themselves or in the mean of a node."""
+    sender, count = sender_map.sender, sender_map.sender_count
+    is_read = np.zeros(count, bool)
+    is_read[sender[(sender >= 0) & (sender < count)]] = True
+    tree = sender_map.tree
     if tree is not None:
-        nodes = np.unique(entries.sender[entries.sender >= entries.sender_count]) - entries.sender_count
-        if entries.smoothed_means is not None:
-            nodes = np.unique(entries.smoothed_means.node)
-        edges = np.zeros(len(tree.order) + 1, np.int64)
+        nodes = np.unique(sender[sender >= count]) - count
+        if sender_map.smoothed_means is not None:
+            nodes = np.unique(sender_map.smoothed_means.node)
+        edges = np.zeros(len(tree.order) + 1, np.int64)  # +1 where the range of a node begins, -1 where it ends
         np.add.at(edges, tree.first[nodes], 1)
         np.add.at(edges, tree.first[nodes] + tree.count[nodes], -1)
         is_read[tree.order[np.cumsum(edges[:-1]) > 0]] = True
     return np.flatnonzero(is_read)
 
 
-def _blocks(gpu: Gpu, rows: Array, sender: Array, weight: Array) -> list[Block]:
+def _entry_blocks(gpu: Gpu, rows: Array, sender: Array, weight: Array) -> list[EntryBlock]:
+    """Upload the entries of rows (R,), with senders (R, n) and weights (R, n, 3)."""
     layout = wgsl.load("sam/gather").layout("array<Entry>")
     return [
-        Block(
+        EntryBlock(
             len(rows[some]),
             gpu.buffer(rows[some].astype(np.uint32)),
             gpu.buffer(layout.pack({"weight": weight[some].reshape(-1, 3), "sender": sender[some].ravel()})),
             gpu.buffer(sender[some].astype(np.int32)),
         )
-        for some in _bindings(len(rows), ENTRY_BYTES * sender.shape[1])
+        for some in _binding_slices(len(rows), ENTRY_BYTES * sender.shape[1])
     ]
 
 
-def _mixes(gpu: Gpu, vertices: Array, mix: NeighbourMixture) -> list[Mixes]:
-    layout = wgsl.load("sam/mix").layout("array<Mix>")
-    found = []
-    for some in _bindings(len(vertices), MIXTURE_BYTES):
+def _mixture_blocks(gpu: Gpu, vertices: Array, mixture: NeighbourMixture) -> list[MixtureBlock]:
+    """Upload the mixtures of vertices (k,)."""
+    layout = wgsl.load("sam/neighbour_mixture").layout("array<Mixture>")
+    blocks = []
+    for some in _binding_slices(len(vertices), MIXTURE_BYTES):
         v = vertices[some]
-        halves = np.concatenate([mix.weight[v], mix.tint[v]], axis=1).view(np.uint32)
-        packed = layout.pack({"row": mix.row[v], "halves": halves})
-        found.append(Mixes(len(v), gpu.buffer(v.astype(np.uint32)), gpu.buffer(packed)))
-    return found
+        halves = np.concatenate([mixture.weight[v], mixture.tint[v]], axis=1).view(np.uint32)
+        packed = layout.pack({"row": mixture.row[v], "halves": halves})
+        blocks.append(MixtureBlock(len(v), gpu.buffer(v.astype(np.uint32)), gpu.buffer(packed)))
+    return blocks
 
 
-def _bindings(count: int, size: int) -> Iterator[slice]:
-    """Of things of so many bytes, those that go into one binding each."""
-    most = LIMITS["max-storage-buffer-binding-size"] // size
+def _binding_slices(count: int, item_bytes: int) -> Iterator[slice]:
+    """Divide `count` items into slices that each fit into one storage binding."""
+    most = LIMITS["max-storage-buffer-binding-size"] // item_bytes
     return (slice(first, first + most) for first in range(0, count, most))
 
 
-def _blends(gpu: Gpu, blend: SmoothedMeans) -> Any:
-    return gpu.buffer(wgsl.load("sam/blends").layout("array<Blend>").pack(vars(blend))) if len(blend.node) else None
-
-
-def over_nodes(graph: Graph, plan: Plan, module: str, over: str, **bindings: Any) -> Any:
-    """The buffer `over`, one of `bindings`, with its nodes filled bottom-up by `module`."""
-    tree = plan.entries.tree
-    if tree is None:
-        return bindings[over]
-    counts = np.diff(tree.levels)
-    at_once = wgsl.load(module).constants["LEVELS"]
-    rows = np.zeros((1 + len(counts) + at_once, 4), np.uint32)  # none below the finest level, none above the root
-    rows[1 : 1 + len(counts), 0] = len(plan.points.face) + tree.levels[:-1]
-    rows[1 : 1 + len(counts), 1] = counts
-    for level in range(0, len(counts), at_once):
-        bindings[over] = graph.dispatch(
-            module,
-            size=int(counts[level]),
-            label=f"level {level}",
-            params={"levels": rows[level : level + at_once + 1], "finest": level == 0},
-            starts=plan.starts,
-            order=plan.order,
-            **bindings,
-        )
-    return bindings[over]
+def _smoothed_means(gpu: Gpu, means: SmoothedMeans) -> Buffer | None:
+    if not len(means.node):
+        return None
+    layout = wgsl.load("sam/smoothed_means").layout("array<SmoothedMean>")
+    return gpu.buffer(layout.pack({"node": means.node, "weight": means.weight}))

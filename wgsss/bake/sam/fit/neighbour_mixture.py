@@ -52,7 +52,7 @@ def neighbour_mixture(
     """
     from scipy.spatial import KDTree
 
-    most = wgsl.load("sam/mix").constants["ROWS"]
+    most = wgsl.load("sam/neighbour_mixture").constants["ROWS"]
     mixture = NeighbourMixture(
         np.tile(np.arange(len(x), dtype=np.int32)[:, None], (1, most)),
         np.zeros((len(x), most), np.float16),

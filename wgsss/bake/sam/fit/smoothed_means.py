@@ -34,7 +34,7 @@ def smoothed_means(tree: PointTree, x: Array, n: Array, area: Array) -> Smoothed
     """
     from scipy.spatial import KDTree
 
-    most = wgsl.load("sam/blends").constants["NEIGHBOURS"]
+    most = wgsl.load("sam/smoothed_means").constants["NEIGHBOURS"]
     node = np.repeat(np.arange(len(area), dtype=np.int32)[:, None], most, axis=1)
     weight = np.zeros((len(WIDTHS), len(area), most), np.float32)
     for a, b in pairwise(tree.levels):

@@ -1,21 +1,23 @@
-// The mean irradiance over the nodes of a tree, weighted by area, bottom-up: five levels at once, the four children of a
-// node being next to each other.
+// The mean irradiance of each node of a tree of senders, weighted by the areas of the senders' fans, bottom-up.
+//
+// One dispatch computes up to five levels. The four children of a node are next to each other, so that each workgroup
+// computes all nodes above its own nodes of the first level.
 
 struct Params {
-    levels: array<vec4u, 6>, // where they begin in `irradiance`, and how many nodes they have: what is below, and five
-    finest: u32,             // 1 where the first of the five is the finest level, whose nodes are over senders
+    levels: array<vec4u, 6>, // x: index of a level's first node in `irradiance`, y: its nodes. The level below, then five
+    starts_at_leaves: u32,   // 1: the first of the five levels holds the leaves, which are above senders
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> starts: array<u32>; // of the finest level's nodes in `order`, and its end
-@group(0) @binding(2) var<storage, read> order: array<u32>;
-@group(0) @binding(3) var<storage, read> area: array<f32>; // of the senders
-@group(0) @binding(4) var<storage, read_write> irradiance: array<vec4f>; // of a node: its mean, and its area
+@group(0) @binding(1) var<storage, read> leaf_starts: array<u32>; // index of each leaf's first sender in `order`, and the end
+@group(0) @binding(2) var<storage, read> order: array<u32>; // senders in the order of the tree
+@group(0) @binding(3) var<storage, read> area: array<f32>; // mm^2, of the senders' fans
+@group(0) @binding(4) var<storage, read_write> irradiance: array<vec4f>; // W/m^2; w: of a node, its area, mm^2
 
 const WIDTH: u32 = 256u;
 const LEVELS: u32 = 5u;
 
-var<workgroup> sums: array<vec4f, WIDTH>; // of irradiance times area, and of area
+var<workgroup> sums: array<vec4f, WIDTH>; // irradiance times area; w: area
 
 fn store(level: u32, k: u32, sum: vec4f) {
     if k < params.levels[level].y {
@@ -28,8 +30,8 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i:
     let k = WIDTH * group.x + i;
     var sum = vec4f(0.0);
     if k < params.levels[1].y {
-        if params.finest == 1u {
-            for (var j = starts[k]; j < starts[k + 1u]; j++) {
+        if params.starts_at_leaves == 1u {
+            for (var j = leaf_starts[k]; j < leaf_starts[k + 1u]; j++) {
                 sum += area[order[j]] * vec4f(irradiance[order[j]].rgb, 1.0);
             }
         } else {
