@@ -34,7 +34,7 @@ def errors(*rel_rmse: float | None) -> list[Errors | None]:
 
 def test_label_names_the_knobs_that_were_set() -> None:
     assert method_label(make_method("jimenez15")) == "jimenez15"
-    assert method_label(make_method("sam", {"samples": 8, "surface": "screen"})) == "sam, samples 8, surface screen"
+    assert method_label(make_method("sam", {"samples": 8, "surface": "screen"})) == "screen+sam, samples 8"
     assert method_label(make_method("jensen02", {"epsilon": 0.25})) == "jensen02, epsilon 0.25"
 
 

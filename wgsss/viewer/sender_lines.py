@@ -58,7 +58,7 @@ def sender_lines(stage: Stage, sam: SamTranslucency, point: npt.ArrayLike) -> Se
     positions = stage.shared(
         ("clusters at rest", id(sender_map)), lambda: clusters_at_rest(body.rest.mesh, sender_map)["position"]
     )
-    senders = clusters["position"][sender] @ matrix[:3, :3].T + matrix[:3, 3]
+    senders = positions[sender] @ matrix[:3, :3].T + matrix[:3, 3]
     return SenderLines(body.rest.placed[vertex], senders, weights)
 
 
