@@ -24,7 +24,8 @@ Array = npt.NDArray[Any]
 ENTRY_BYTES = 16
 """bytes of one entry on the device: a sender and three weights"""
 MIXTURE_BYTES = 48
-"""bytes of one mixture on the device: ROWS (wgsl/sam/neighbour_mixture.wgsl) times an index and a float16, and three float16 more"""
+"""bytes of one mixture on the device: ROWS (wgsl/sam/neighbour_mixture.wgsl) times an index and a float16, and three
+float16 more"""
 FAINTEST = 1e-3
 """smallest total weight of a receiver, as a share of the total of R_d: receivers with less in all channels have no
 entries"""
