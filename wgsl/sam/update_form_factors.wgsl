@@ -71,7 +71,7 @@ fn form_factor(entry: Entry, sender: i32, receiver: u32) -> vec3f {
 }
 
 // The index of the entry, of those from `first` on, that has this sender; `first + params.entries_per_row`: none has.
-fn entry_of(sender: i32, first: u32) -> u32 {
+fn find_entry(sender: i32, first: u32) -> u32 {
     var e = first;
     while e < first + params.entries_per_row && current[e] != sender {
         e++;
@@ -94,7 +94,7 @@ fn return_to_rest_senders(first: u32, receiver: u32) {
         }
         let from_rest = form_factor(entry, entry.sender, receiver);
         if !is_better(form_factor(entry, current[e], receiver), from_rest) {
-            let other = entry_of(entry.sender, first);
+            let other = find_entry(entry.sender, first);
             if other < first + params.entries_per_row {
                 current[other] = current[e];
             }
@@ -112,7 +112,7 @@ fn climb(e: u32, first: u32, receiver: u32) {
         for (var j = neighbours[here]; j < neighbours[here + 1]; j++) {
             let neighbour = i32(neighbours[j]);
             let K = form_factor(entry, neighbour, receiver);
-            if is_better(K, best) && entry_of(neighbour, first) == first + params.entries_per_row {
+            if is_better(K, best) && find_entry(neighbour, first) == first + params.entries_per_row {
                 current[e] = neighbour;
                 best = K;
             }
