@@ -360,11 +360,17 @@ def _padded(layout: Layout, stride: int) -> np.dtype:
 
 
 def _functions(clean: str) -> Iterator[tuple[str, str, str]]:
-    """Yield name, parameters and body of each function in a text without comments."""
+    """Yield name, parameters and body of each function in a text without comments.
+
+    If the brackets of a function do not match, its body is the rest of the text; the compiler reports the error.
+    """
     for match in _FUNCTION.finditer(clean):
         opened = _closing(clean, match.end() - 1, "()")
-        body = clean.index("{", opened)
-        yield match.group(1), clean[match.end() : opened], clean[body : _closing(clean, body, "{}")]
+        body = clean.find("{", opened)
+        if body < 0:
+            yield match.group(1), "", clean[match.end() :]
+        else:
+            yield match.group(1), clean[match.end() : opened], clean[body : _closing(clean, body, "{}")]
 
 
 def _closing(clean: str, start: int, brackets: str) -> int:
