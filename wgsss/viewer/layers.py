@@ -12,8 +12,9 @@ import numpy.typing as npt
 from wgsss.bake.stretch import stretch
 from wgsss.bake.thickness import local_thickness
 from wgsss.frame import Frame
-from wgsss.gpu import Gpu
+from wgsss.gpu import Buffer, Gpu
 from wgsss.graph import Handle
+from wgsss.passes import Outputs
 from wgsss.stage import Body
 
 Array = npt.NDArray[Any]
@@ -52,13 +53,12 @@ def _shadow_map(frame: Frame) -> Handle | None:
     if not frame.lighting.views:
         return None
     shadow_maps = frame.lighting.shadow_maps
-    display: Handle = frame.graph.draw("viewer/shadow", size=shadow_maps.size[:2], shadow_maps=shadow_maps)
-    return display
+    return frame.graph.draw("viewer/shadow", size=shadow_maps.size[:2], shadow_maps=shadow_maps)
 
 
 def _draw_vertex_colours(frame: Frame, layer: str) -> Handle | None:
     graph, stage = frame.graph, frame.stage
-    drawn: Any = None
+    drawn: Outputs | None = None
     for body in stage.bodies:
         colors = stage.shared(
             (layer, id(body.rest.mesh), id(body.material)), partial(_upload, stage.gpu, _VERTEX_COLOURS[layer], body)
@@ -77,6 +77,6 @@ def _draw_vertex_colours(frame: Frame, layer: str) -> Handle | None:
     return None if drawn is None else drawn.display
 
 
-def _upload(gpu: Gpu, colours: Callable[[Body], Array], body: Body) -> Any:
+def _upload(gpu: Gpu, colours: Callable[[Body], Array], body: Body) -> Buffer:
     """Upload the vertex colours of a body as array<vec4f>."""
     return gpu.buffer(np.pad(colours(body), ((0, 0), (0, 1))).astype(np.float32))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -88,7 +87,7 @@ class _Shadows:
     """
 
     key: tuple[int, tuple[Light, ...], float]
-    lighting: Any
+    lighting: shared.Lighting
     graph: Graph
 
 
@@ -147,8 +146,7 @@ class LiveRenderer:
         outputs += [shadow_maps] if isinstance(shadow_maps, Handle) else []
         graph.run(*dict.fromkeys(outputs), timed=timed)
         if isinstance(shadow_maps, Handle):  # drawn in this frame: keep the texture for the next
-            lighting = copy(frame.lighting)
-            lighting.shadow_maps = shadow_maps.resource.gpu
+            lighting = replace(frame.lighting, shadow_maps=shadow_maps.resource.gpu)
             self._shadows = _Shadows(key, lighting, graph)
         return Drawing(graph, gbuffer_id, pictures)
 
