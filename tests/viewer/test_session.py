@@ -47,8 +47,8 @@ def open_slab(gpu: Gpu, **options: Any) -> Session:
 
 def test_command_states_only_what_differs_from_the_defaults(session: Session) -> None:
     assert shlex.split(session.command(0)) == [
-        *("wgsss", "render", "slab", "--vertices", "300", "--method", "sam"),
-        *("--set", "select=top", "--set", "surface=screen", "--size", "24x16"),
+        *("wgsss", "render", "slab", "--vertices", "300", "--method", "screen+sam"),
+        *("--set", "select=top", "--size", "24x16"),
     ]
     assert shlex.split(session.command(1))[5:9] == ["--method", "screen+none", "--set", "taps=9"]
 
