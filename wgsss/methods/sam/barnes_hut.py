@@ -82,7 +82,7 @@ def _sum(
     assert tree is not None and gpu_map.tree is not None
     levels = np.zeros((_LEVELS, 4), np.uint32)
     levels[: len(tree.levels) - 1, 0] = gpu_map.sender_map.sender_count + tree.levels[:-1]
-    M_back: Handle = graph.dispatch(
+    return graph.dispatch(
         "sam/barnes_hut",
         size=len(tree.order),
         constants=constants,
@@ -101,7 +101,6 @@ def _sum(
         scale=scale,
         history=history,
     )
-    return M_back
 
 
 def _scale(body: Body, gpu_map: GpuSenderMap) -> Array:

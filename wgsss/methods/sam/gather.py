@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from wgsss import frame as shared
 from wgsss.frame import Frame
 from wgsss.gpu import Buffer
-from wgsss.graph import Graph, Handle
+from wgsss.graph import Bindings, Graph, Handle
 from wgsss.methods.sam.tree_nodes import node_means
 from wgsss.methods.sam.upload import GpuSenderMap
 from wgsss.stage import Body
@@ -50,11 +48,12 @@ def gather(
         "sender_count": len(gpu_map.points.face),
         "skipped_means": gpu_map.node_count if gpu_map.smoothed_count else 0,
     }
-    output: dict[str, Any] = {}  # the first block makes the buffer, the others write into it
+    M_back: Handle | None = None
     for block, block_entries in zip(gpu_map.entry_blocks, entries, strict=True):
-        output["M_back"] = graph.dispatch(
+        output: Bindings = {} if M_back is None else {"M_back": M_back}  # all blocks write into one buffer
+        M_back = graph.dispatch(
             "sam/gather",
-            size=block.row_count if output else row_count,
+            size=row_count if M_back is None else block.row_count,
             params=params,
             rows=block.rows,
             entries=block_entries,
@@ -62,21 +61,21 @@ def gather(
             history=history,
             **output,
         )
-    M_back: Handle = output["M_back"]
+    assert M_back is not None, "a map on the GPU has entries"
     return M_back
 
 
 def mix_neighbours(graph: Graph, gpu_map: GpuSenderMap, gathered: Handle, vertex_count: int) -> Handle:
     """Compute M_back of each vertex as its mixture of what rows gathered; without mixtures, return `gathered`."""
-    output: dict[str, Any] = {}
+    M_back: Handle | None = None
     for block in gpu_map.mixture_blocks:
-        output["M_back"] = graph.dispatch(
+        output: Bindings = {} if M_back is None else {"M_back": M_back}
+        M_back = graph.dispatch(
             "sam/neighbour_mixture",
-            size=block.vertex_count if output else vertex_count,
+            size=vertex_count if M_back is None else block.vertex_count,
             vertices=block.vertices,
             mixtures=block.mixtures,
             gathered=gathered,
             **output,
         )
-    M_back: Handle = output.get("M_back", gathered)
-    return M_back
+    return M_back or gathered

@@ -56,7 +56,13 @@ class SamTranslucency:
             self.sender_map(body)
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:
-        """Declare the passes that estimate M_back, W/m^2 per pixel; None: no vertex of the scene receives any."""
+        """Declare the passes that estimate M_back, W/m^2 per pixel; None: no vertex of the scene receives any.
+
+        Several methods of one frame with the same knobs share the passes.
+        """
+        return frame.once(("sam M_back", self), lambda: self._M_back(frame))
+
+    def _M_back(self, frame: Frame) -> Handle | None:
         M_back: Handle | None = None
         for body in frame.stage.bodies:
             gpu_map = self.gpu_map(body)
@@ -79,15 +85,12 @@ class SamTranslucency:
         """Return the Spatial Adjacency Map of a body at rest. Bodies of equal mesh and material share it."""
         mesh, stage, profile = body.rest.mesh, body.stage, body.material.profile
         key = ("sam", id(mesh), id(body.material))
-        sender_map: SenderMap
         if self.select == "fit" and body.rest.motion is not None:  # `barnes_hut` reads no entries
-            sender_map = stage.shared(key, lambda: full_sender_tree(stage.gpu, mesh, profile))
-        else:
-            sender_map = stage.shared(
-                (*key, self.samples, self.select),
-                lambda: spatial_adjacency_map(stage.gpu, mesh, profile, self.samples, self.select),
-            )
-        return sender_map
+            return stage.shared(key, lambda: full_sender_tree(stage.gpu, mesh, profile))
+        return stage.shared(
+            (*key, self.samples, self.select),
+            lambda: spatial_adjacency_map(stage.gpu, mesh, profile, self.samples, self.select),
+        )
 
     def gpu_map(self, body: Body) -> GpuSenderMap | None:
         """Return the map of a body on the GPU; None: none of its vertices receives any light from its back side.
@@ -96,11 +99,10 @@ class SamTranslucency:
         """
         sender_map, stage, mesh = self.sender_map(body), body.stage, body.rest.mesh
         deforms = body.rest.motion is not None
-        gpu_map: GpuSenderMap | None = stage.shared(
+        return stage.shared(
             ("sam upload", id(sender_map), body.index if deforms else None),
             lambda: upload(stage.gpu, mesh, body.render_mesh.faces, sender_map, deforms=deforms),
         )
-        return gpu_map
 
     def M_back_at_vertices(self, frame: Frame, body: Body, gpu_map: GpuSenderMap) -> Handle:
         """Declare the passes that estimate M_back at the V vertices of a body's mesh.
@@ -125,7 +127,7 @@ class SamTranslucency:
     def _history(self, body: Body, gpu_map: GpuSenderMap) -> tuple[MBackHistory, float]:
         """Return M_back of the last frame of a body, and the seconds since then."""
         stage, rows = body.stage, len(gpu_map.sender_map.sender)
-        history: MBackHistory = stage.shared(
+        history = stage.shared(
             ("M_back", self, body.index), lambda: MBackHistory(stage.gpu.buffer(np.zeros((rows, 4), np.float32)))
         )
         return history, history.advance(stage.time_s)

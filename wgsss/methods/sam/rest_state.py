@@ -59,8 +59,7 @@ def rest_state(body: Body, gpu_map: GpuSenderMap) -> RestState:
             steps,
         )
 
-    state: RestState = body.stage.shared(("rest state", id(gpu_map)), make)
-    return state
+    return body.stage.shared(("rest state", id(gpu_map)), make)
 
 
 def clusters_at_rest(mesh: Mesh, sender_map: SenderMap) -> dict[str, Array]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from wgsss import wgsl
 from wgsss.gpu import Buffer
-from wgsss.graph import Graph, Handle
+from wgsss.graph import Bindings, Graph, Handle, Value
 from wgsss.methods.sam.upload import GpuSenderMap
 
 
@@ -32,12 +30,7 @@ def node_clusters(graph: Graph, gpu_map: GpuSenderMap, clusters: Handle) -> Hand
 
 
 def _fill_nodes(
-    graph: Graph,
-    gpu_map: GpuSenderMap,
-    module: str,
-    name: str,
-    buffer: Handle,
-    **bindings: Any,
+    graph: Graph, gpu_map: GpuSenderMap, module: str, name: str, buffer: Handle, **bindings: Value
 ) -> Handle:
     """Run a module from the leaves to the root, several levels in a dispatch.
 
@@ -54,7 +47,7 @@ def _fill_nodes(
     levels[1 : 1 + len(counts), 0] = len(gpu_map.points.face) + tree.levels[:-1]
     levels[1 : 1 + len(counts), 1] = counts
     for level in range(0, len(counts), levels_at_once):
-        bindings[name] = buffer
+        values: Bindings = {**bindings, name: buffer}
         buffer = graph.dispatch(
             module,
             size=int(counts[level]),
@@ -62,6 +55,6 @@ def _fill_nodes(
             params={"levels": levels[level : level + levels_at_once + 1], "starts_at_leaves": level == 0},
             leaf_starts=gpu_map.tree.leaf_starts,
             order=gpu_map.tree.order,
-            **bindings,
+            **values,
         )
     return buffer
