@@ -164,6 +164,7 @@ def test_a_changed_line_in_any_module_of_the_closure_changes_the_key(tmp_path: P
     assert "wgsss/scene/files/stl.py" not in unwrap, "an edit to a reader of files makes no new atlases"
 
 
+@pytest.mark.filterwarnings("ignore:.*no more than 1000 may be taken")
 def test_the_code_that_runs_while_an_entry_is_made_belongs_to_its_key(
     gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

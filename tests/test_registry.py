@@ -123,7 +123,12 @@ def test_a_pair_is_a_darker_shade_of_the_method_with_its_translucency(surface: s
 
 
 def test_published_methods_are_known_as_pairs() -> None:
-    pairs = {"deon07": "texture+tsm", "jimenez15": "screen+transmittance", "barre11": "none+thickness"}
+    pairs = {
+        "deon07": "texture+tsm",
+        "jimenez15": "screen+transmittance",
+        "barre11": "none+thickness",
+        "sam": "texture+sam",
+    }
     assert {name: pair_of(METHODS[name]) for name in pairs} == pairs
     for name in ("lambert", "jimenez08", "jensen02"):
         assert pair_of(METHODS[name]) is None

@@ -39,7 +39,8 @@ def fingerprint(value: object, *modules: str) -> str:
             yield from (name.encode(), source)
 
     for part in parts():  # each with its length, so that different sequences of parts are different bytes
-        digest.update(b"%d:" % len(part) + part)
+        digest.update(b"%d:" % len(part))
+        digest.update(part)
     return digest.hexdigest()
 
 
@@ -84,19 +85,19 @@ def closure(modules: Iterable[str]) -> dict[str, bytes]:
     the module that defines the name. A string that is the name of a WGSL module adds that module with its imports.
     Other packages do not count: where the version of one matters, the key must contain it.
     """
-    reached, found, shaders = [*modules], dict[str, bytes](), set[str]()
+    reached, sources, shaders = [*modules], dict[str, bytes](), set[str]()
     while reached:
         module = reached.pop()
-        if module not in found:
-            found[module] = _package()[module] if module in _package() else _outside(module)
-            imports, strings = _references(found[module])
+        if module not in sources:
+            sources[module] = _package()[module] if module in _package() else _outside(module)
+            imports, strings = _references(sources[module])
             reached += [_home(imported) for imported in imports if imported.module in _package()]
             shaders |= strings & _shaders()
-    for module in [*found]:  # the packages around it run first
+    for module in [*sources]:  # the packages around a module run before it
         while module := module.rpartition(".")[0]:
             if module in _package():
-                found[module] = _package()[module]
-    return found | {f"wgsl/{name}.wgsl": wgsl.load(name, wgsl.ROOT).source.encode() for name in shaders}
+                sources[module] = _package()[module]
+    return sources | {f"wgsl/{name}.wgsl": wgsl.load(name, wgsl.ROOT).source.encode() for name in shaders}
 
 
 class _Import(NamedTuple):
