@@ -158,13 +158,13 @@ def test_a_changed_line_in_any_module_of_the_closure_changes_the_key(tmp_path: P
         assert not [file for file, is_same in files.items() if is_same], site
     unwrap, sam, scale, integral = same.values()
     assert {"wgsss/scene/mesh.py", "wgsss/bake/atlas.py", "wgsl/bake/atlas_faces.wgsl"} <= unwrap.keys()
-    assert {"wgsss/bake/sam/fit/training.py", "wgsl/sam/mix.wgsl", "wgsl/sam/form_factors.wgsl"} <= sam.keys()
-    assert {"wgsss/methods/sam/deform.py", "wgsl/sam/sum.wgsl"} <= scale.keys()
+    assert {"wgsss/bake/sam/fit/training.py", "wgsl/sam/neighbour_mixture.wgsl", "wgsl/sam/top.wgsl"} <= sam.keys()
+    assert {"wgsss/methods/sam/deform.py", "wgsl/sam/barnes_hut.wgsl"} <= scale.keys()
     assert {"wgsss/scene/mesh.py", "wgsss/emitters.py", "wgsl/light.wgsl"} <= integral.keys()
-    assert "wgsss/scene/files/stl.py" not in unwrap, "an edit to a reader of files makes no new atlases"
+    assert "wgsss/scene/loading.py" not in unwrap, "an edit to a reader of files makes no new atlases"
 
 
-@pytest.mark.filterwarnings("ignore:.*no more than 1000 may be taken")
+@pytest.mark.filterwarnings("ignore::wgsss.errors.Note")
 def test_the_code_that_runs_while_an_entry_is_made_belongs_to_its_key(
     gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
