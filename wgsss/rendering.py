@@ -1,4 +1,4 @@
-"""From a scene and a method to an image."""
+"""Render images: a scene by a method."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Image:
         pixels: float32 (H, W, 4), linear RGB radiance, W/(m^2 sr), and coverage.
         display: uint8 (H, W, 4), exposed, tone mapped and sRGB-encoded, with coverage in alpha.
         aovs: float32 (H, W, 3) or, for depth, (H, W, 1), by name: `irradiance` (L_d), `M_front` and `M_back` in W/m^2,
-            `specular` in W/(m^2 sr), `depth` (distance along the viewing direction, mm; inf where nothing is seen) and
+            `specular` in W/(m^2 sr), `depth` (distance along the viewing direction, mm; inf in the background) and
             `normal` (world space).
         timings: ms of each pass that ran, by name, measured by `clock`. A pass's first run includes its compilation.
         graph: the frame's graph, for `str` and `dot`.
-        metadata: what made the image, in words: scene, method, knobs, adapter, exposure, tone_map, bloom, time_s.
+        metadata: how the image was rendered: scene, method, knobs, adapter, exposure, tone_map, bloom, time_s.
     """
 
     pixels: Array
@@ -51,13 +51,15 @@ class Image:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A frame by one method, as declared: radiance, the image for a display, what M is the sum of, and `layers`, by
-    AOVS; None is black."""
+    """The outputs of a frame's passes by one method."""
 
     radiance: Handle
     display: Handle
+    """the image for a display"""
     M: tuple[Handle, ...]
+    """textures whose sum is M"""
     layers: dict[str, Handle | None]
+    """by AOVS; None is black"""
 
 
 def draw(frame: shared.Frame, method: Method) -> Drawn:
@@ -81,21 +83,22 @@ def draw(frame: shared.Frame, method: Method) -> Drawn:
 
 
 class Renderer:
-    """One scene, method and size, from frame to frame.
+    """Renders frames of one scene by one method at one size.
 
-    Raises InputError for a size that the device cannot draw. Baking happens here, and may take a while the first time.
+    The constructor bakes what the method needs, which may take a while the first time. Raises InputError for a size
+    that the device cannot draw.
     """
 
     def __init__(self, scene: Scene, method: Method, size: tuple[int, int], gpu: Gpu | None = None) -> None:
         checks.image_size(size)
         self.gpu = gpu or default_gpu()
-        self.gpu.trim()  # or what frames of all earlier sizes, scenes and knobs needed would be kept
+        self.gpu.trim()  # otherwise the pool would keep resources of all earlier sizes, scenes and knobs
         self.method, self.size = method, size
         self.stage = Stage(self.gpu, scene)
         method.bake(self.stage)
 
     def frame(self, time_s: float = 0.0, aovs: Sequence[str] = (), timed: bool = True) -> Image:
-        """The image at a time in seconds, with the named extra outputs (AOVS).
+        """Return the image at a time in seconds, with the named extra outputs (AOVS).
 
         Raises RenderError where a pixel is not finite.
         """
@@ -108,16 +111,16 @@ class Renderer:
         frame = shared.begin(graph, self.stage, self.size)
         drawn = draw(frame, self.method)
         radiance, display = drawn.radiance, drawn.display
-        wanted = {name: drawn.layers[name] for name in aovs}
-        graph.run(radiance, display, *(h for h in wanted.values() if h is not None), timed=timed)
+        layers = {name: drawn.layers[name] for name in aovs}
+        graph.run(radiance, display, *(h for h in layers.values() if h is not None), timed=timed)
         pixels = graph.read(radiance)
-        found = {name: self._aov(graph, frame, name, handle) for name, handle in wanted.items()}
-        for name, values in (("radiance", pixels), *found.items()):
+        extra = {name: self._aov(graph, frame, name, handle) for name, handle in layers.items()}
+        for name, values in (("radiance", pixels), *extra.items()):
             bad = ~np.isfinite(values).all(axis=2) & (pixels[..., 3] > 0)
             if bad.any():
                 y, x = np.argwhere(bad)[0]
                 raise RenderError(f"{int(bad.sum())} pixels of {name} are not finite, the first at x {x}, y {y}")
-        return Image(pixels, graph.read(display), found, graph.times, graph.clock, graph, self._metadata())
+        return Image(pixels, graph.read(display), extra, graph.times, graph.clock, graph, self._metadata())
 
     def _metadata(self) -> dict[str, str]:
         scene, method = self.stage.scene, self.method
@@ -139,7 +142,7 @@ class Renderer:
         texels = graph.read(handle).astype(np.float32)
         if name != "depth":
             return texels[..., :3]
-        # Clip depth is affine in distance or in 1/distance: the projection's lower right corner, undone.
+        # Clip depth is affine in distance or in 1/distance: invert the lower right corner of the projection matrix.
         projection = frame.view.world_to_clip @ np.linalg.inv(self.stage.scene.camera.view())
         (a, b), (c, d) = projection[2:, 2:]
         with np.errstate(divide="ignore"):

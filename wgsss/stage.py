@@ -115,7 +115,7 @@ class Stage:
 
 
 class Body:
-    """One object of a stage, with its buffers and textures."""
+    """One object of a stage: its buffers and textures."""
 
     def __init__(self, stage: Stage, index: int) -> None:
         # Weak, since the buffers and textures of a cycle would stay on the device until the garbage collector runs.

@@ -1,16 +1,16 @@
-"""barre11's translucency: local thickness, baked, and the light behind it (Barré-Brisebois & Bouchard 2011).
+"""The translucency method of barre11: baked local thickness, and the light behind it (Barré-Brisebois & Bouchard 2011).
 
-As printed, light that has crossed an object is
+In the paper, the light that has crossed an object is
 
     vLTLight = L + N distortion
     fLTDot   = saturate(V . -vLTLight)^power scale
     fLT      = attenuation (fLTDot + ambient) thickness
     out      = albedo light fLT
 
-summed over the lights, without shadows. Here `albedo` is the profile's total times the base colour, `light` times
-`attenuation` the irradiance that a surface facing the light has, and `out` is M_back: the pass that shows M multiplies
-by rho_dt / pi, which is the 1 / pi that games leave out of the albedo. So a thickness and a bracket of 1 are a surface
-that lets through all that it would reflect.
+summed over the lights, without shadows. Here `albedo` is the total reflectance times the base colour, `light` times
+`attenuation` is the irradiance of a surface that faces the light, and `out` is M_back. The composite pass multiplies
+M_back by rho_dt / pi; this is the factor 1 / pi that games leave out of the albedo. Where the thickness and fLTDot +
+ambient are 1, the surface transmits as much as it would reflect.
 """
 
 from __future__ import annotations
@@ -32,46 +32,44 @@ from wgsss.stage import Body, Stage
 Array = npt.NDArray[Any]
 
 SETS = 4
-"""of parameters that a g-buffer has room for"""
+"""the number of different sets of parameters that a g-buffer can hold"""
 
 
 @dataclass(frozen=True)
 class LocalThickness:
-    """M_back by the thickness around each vertex, and by where the light and the viewer are.
+    """M_back by the thickness around each vertex and the directions to the light and to the viewer.
 
-    What depends on the material is in the thickness (see `wgsss.bake.thickness`) and in the albedo. The defaults of the
-    knobs are fitted to the diffusion integral's M_back at the vertices of `ear`, seen from all round, of skin, skin1,
-    marble and wholemilk at once, and then to the other scenes as they are seen. The mean of M_back is then 0.99, 1.06,
-    1.12 and 1.08 of the integral's on the ear, 1.07 on the statue, 0.88 on the gyroid, 0.80 on the milk, 1.14 on the
-    wave and 0.62 on the leaf. It changes with the view, as the integral's does not. A larger power, as the paper has,
-    errs less where one looks towards the light and more elsewhere.
+    The material determines the thickness (see `wgsss.bake.thickness`) and the albedo. The defaults of the knobs are
+    fitted to M_back of the reference `integral`: at the vertices of `ear`, seen from all directions, for skin, skin1,
+    marble and wholemilk together, and then in the views of the other scenes. The mean of M_back is then 0.99, 1.06,
+    1.12 and 1.08 times the reference's on the ear, 1.07 on the statue, 0.88 on the gyroid, 0.80 on the milk, 1.14 on
+    the wave and 0.62 on the leaf. It depends on the view; the reference's does not. A larger power, as in the paper,
+    has smaller errors where the viewer looks towards the light, and larger ones elsewhere.
 
-    As in the paper, `distortion`, `power` and `ambient` are the material's, where it has them (its `transport`), and
-    `scale` tunes them all. A g-buffer tells up to SETS of them apart, by bits that colour spares: 7 bits of red and
-    green are left, or 6 of grey.
+    As in the paper, a material may have values of `distortion`, `power` and `ambient` of its own, its `transport`;
+    `scale` applies to all. A g-buffer can hold up to SETS different ones. Their number takes one bit each of red and
+    green, which leaves 7 bits for these colours, or two bits of grey, which leaves 6.
 
-    An environment counts as light from straight behind: by scale + ambient of the irradiance that a surface
-    facing away has. Nothing casts shadows, as in the paper, and what moves keeps its thickness at rest.
+    The environment counts as light from straight behind: scale + ambient times the irradiance of a surface that faces
+    away. As in the paper, there are no shadows, and an object that deforms keeps its thickness at rest.
     """
 
     distortion: float = field(
-        default=0.0, metadata={"unit": "", "range": (0, 1), "help": "how far the normal turns the light that is seen"}
+        default=0.0, metadata={"unit": "", "range": (0, 1), "help": "how much the normal bends the light from behind"}
     )
     power: float = field(
-        default=2.0, metadata={"unit": "", "range": (0.1, 64), "help": "how narrow the light from behind is seen"}
+        default=2.0, metadata={"unit": "", "range": (0.1, 64), "help": "how narrow the highlight around a light is"}
     )
-    scale: float = field(
-        default=0.8, metadata={"unit": "", "range": (0, 10), "help": "of the light from behind, on all lights"}
-    )
+    scale: float = field(default=0.8, metadata={"unit": "", "range": (0, 10), "help": "strength of that highlight"})
     ambient: float = field(
-        default=0.05, metadata={"unit": "", "range": (0, 1), "help": "share of the light that is seen from everywhere"}
+        default=0.05, metadata={"unit": "", "range": (0, 1), "help": "light that does not depend on the view"}
     )
     thickness: str = field(
-        default="coloured", metadata={"unit": "", "choices": ("coloured", "grey"), "help": "what the map has"}
+        default="coloured", metadata={"unit": "", "choices": ("coloured", "grey"), "help": "colours of the thickness"}
     )
     stored: str = field(
         default="vertices",
-        metadata={"unit": "", "choices": ("vertices", "g-buffer"), "help": "where; 8 bits and light per pixel"},
+        metadata={"unit": "", "choices": ("vertices", "g-buffer"), "help": "where thickness is stored"},
     )
 
     source: ClassVar[str] = "Barré-Brisebois & Bouchard 2011"
@@ -85,18 +83,18 @@ class LocalThickness:
                 raise unknown(knob.name, value, choices)
 
     def bake(self, stage: Stage) -> None:
-        """Measure the thickness of each mesh for its material.
+        """Compute the thickness of each mesh for its material.
 
-        Raises InputError where a g-buffer is to tell more than SETS parameters of materials apart.
+        Raises InputError where materials have more than SETS different parameters and the thickness is in a g-buffer.
         """
-        if self.stored == "g-buffer" and len(found := self._sets(stage)) > SETS:
-            raise InputError(f"a g-buffer has room for {SETS} materials' transport, not for {len(found)}")
+        if self.stored == "g-buffer" and len(sets := self._sets(stage)) > SETS:
+            raise InputError(f"a g-buffer has room for {SETS} materials' transport, not for {len(sets)}")
         for body in stage.bodies:
             self.map(body)
 
     def map(self, body: Body) -> Array:
-        """float32 (V, 3): the thickness at the vertices, white where it is thin. Grey lets through as much white light
-        as coloured, weighted by what the channels reflect."""
+        """Return the thickness at the vertices, float32 (V, 3), as the paper stores it: 1 where a body is thin. Grey is
+        the mean of the channels weighted by their total reflectance."""
         mesh, profile = body.rest.mesh, body.material.profile
         coloured = body.stage.shared(
             ("local thickness", id(mesh), id(body.material)), lambda: local_thickness(mesh, profile)
@@ -172,18 +170,18 @@ class LocalThickness:
         )
 
     def _transport(self, body: Body) -> dict[str, float]:
-        """The parameters of a body: its material's own, or the knobs."""
+        """Return the parameters of a body: those of its material, or the knobs."""
         names = ("distortion", "power", "ambient")
         own = body.material.transport or tuple(getattr(self, name) for name in names)
         return {**dict(zip(names, own, strict=True)), "scale": self.scale}
 
     def _sets(self, stage: Stage) -> list[dict[str, float]]:
-        """The parameters that the bodies have, each once."""
-        found: list[dict[str, float]] = []
+        """Return the different parameters of all bodies."""
+        sets: list[dict[str, float]] = []
         for body in stage.bodies:
-            if (transport := self._transport(body)) not in found:
-                found.append(transport)
-        return found
+            if (transport := self._transport(body)) not in sets:
+                sets.append(transport)
+        return sets
 
 
 def _albedo(body: Body) -> Array:

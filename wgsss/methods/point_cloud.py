@@ -1,9 +1,8 @@
-"""jensen02: two passes, over samples of the surface and over an octree of them (Jensen & Buhler 2002; Mikkelsen 2009,
-section 3.2).
+"""jensen02: a sum over samples of the surface, by an octree (Jensen & Buhler 2002; Mikkelsen 2009, section 3.2).
 
-L_d is gathered at samples about a mean free path apart, its flux summed up an octree, and M at a pixel is the sum over
-nodes small enough for their distance. A sum over samples knows nothing of what happens between them: the part of the
-profile that is narrower than their spacing is left to L_d at the pixel itself.
+L_d is computed at samples about a mean free path apart, and its flux is summed up an octree. M at a pixel is the sum
+over nodes that are small compared with their distance. The sum cannot resolve the part of the profile that is narrower
+than the spacing of the samples: this part multiplies L_d at the pixel itself.
 """
 
 from __future__ import annotations
@@ -31,19 +30,19 @@ Array = npt.NDArray[Any]
 
 _GATHER = "point_cloud/gather"
 NEAR = 1.5
-"""Within this many spacings of x_o, the profile is blunted to what samples resolve. An evenly lit plane of Skin1, at a
-spacing of a mean free path, is then even to 0.1, 0.2 and 0.4 %; with 1, to 0.2, 0.5 and 1.1 %. With more, shadows stay
-sharp where light should have spread.
+"""The distance from x_o, in spacings of samples, within which the profile is flattened. On an evenly lit plane of Skin1
+with samples a mean free path apart, M then varies by 0.1, 0.2 and 0.4 % in red, green and blue; with 1 instead by 0.2,
+0.5 and 1.1 %. Larger values would make more of the light leave where it enters, and shadows too sharp.
 """
-_CLOSEST = 0.02  # of that distance: closer, R_d is level
+_CLOSEST = 0.02  # as a share of that distance: closer to x_o, R_d is taken to be constant
 _MANTISSA, _EXPONENT = 9, 5  # bits of the table's entries
-_NO_AREA = 1e-30  # mm^2, of samples of a body that has been scaled to nothing: the middle of none is not defined
-_BEYOND = 1e-5  # share of the light that is left out for being far
+_NO_AREA = 1e-30  # mm^2, of the samples of a body that is scaled to nothing: means weighted by 0 would be undefined
+_BEYOND = 1e-5  # share of the light that is ignored since it leaves far away
 
 
 @dataclass(frozen=True)
 class PointCloud:
-    """M_front and M_back as sums over the samples, or the nodes that stand for them, on either side."""
+    """M_front and M_back as sums over samples, or nodes of samples, on the front and on the back side."""
 
     epsilon: float = field(
         default=0.3,
@@ -63,20 +62,20 @@ class PointCloud:
     )
 
     def bake(self, stage: Stage) -> None:
-        """Spread samples over each mesh and build their octree; tabulate each material's profile."""
+        """Distribute samples over each mesh, build their octree, and tabulate each material's profile."""
         for body in stage.bodies:
             self.cloud(body)
             self.kernel(body)
 
     def cloud(self, body: Body) -> Cloud:
-        """The samples of a body's mesh at rest."""
+        """Return the samples of a body's mesh at rest."""
         mesh, material, stage = body.rest.mesh, body.material, body.stage
-        path = stage.shared(("mean free path", id(material)), lambda: mean_free_path(material))  # takes milliseconds
+        path = stage.shared(("mean free path", id(material)), lambda: mean_free_path(material))
         spacing = self.spacing * path
         return stage.shared(("point cloud", id(mesh), spacing), lambda: point_cloud(mesh, spacing))
 
     def kernel(self, body: Body) -> Kernel:
-        """The profile of a body's material as its samples see it."""
+        """Return the table of the profile of a body's material for the spacing of its samples."""
         cloud, mesh, profile = self.cloud(body), body.rest.mesh, body.material.profile
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         key = ("kernel", id(body.material), cloud.spacing, size)
@@ -109,7 +108,7 @@ class PointCloud:
         return body.stage.shared(("table", id(kernel)), lambda: body.stage.gpu.buffer(kernel.packed))
 
     def _entering(self, frame: Frame, body: Body) -> Handle:
-        """What the nodes of a body's octree stand for, from the samples up."""
+        """Return the buffer of array<Entering> of a body's octree, filled from the samples upwards."""
         graph, posed, cloud = frame.graph, self._posed(body), self.cloud(body)
         tree, params = cloud.tree, {"epsilon": self.epsilon, "farthest": self.kernel(body).r[-1]}
         irradiance = irradiance_points(frame, body, posed.points, len(cloud.samples.face), cloud.samples)
@@ -133,7 +132,7 @@ class PointCloud:
         return entering
 
     def _heights(self, body: Body) -> list[tuple[int, Buffer]]:
-        """How many nodes there are of each height from 1 on, and a buffer of which they are."""
+        """Return, for each height from 1 on, the number of its nodes and a buffer of u32 with their indices."""
         cloud, gpu = self.cloud(body), body.stage.gpu
 
         def make() -> list[tuple[int, Buffer]]:
@@ -143,8 +142,8 @@ class PointCloud:
         return body.stage.shared(("heights", id(cloud)), make)
 
     def _posed(self, body: Body) -> Posed:
-        """A body's samples as posed, on the device. Of a moving one only the last pose is kept. Bodies of one mesh do
-        not share them: others hide other parts of the sky from each."""
+        """Return a body's samples as posed, on the device. Of a moving body only the last pose is kept. Bodies with the
+        same mesh do not share them, since the share of the environment that they receive differs."""
         cloud, stage = self.cloud(body), body.stage
         last: dict[float, Posed] = stage.shared(("posed", body.index, cloud.spacing), dict)
         time_s = 0.0 if body.rest.motion is None else stage.time_s
@@ -155,9 +154,8 @@ class PointCloud:
 
 
 def mean_free_path(material: Material) -> float:
-    """1/(sigma_a + sigma_s') in mm, of the top layer; where only the profile is known, the distance within which half
-    of the light leaves. Of the channels the middle one: what is narrower in another is left to the pixel.
-    """
+    """Return 1 / (sigma_a + sigma_s') of the top layer in mm, the median of the channels. Where only the profile of a
+    material is known, return the distance within which half of the light leaves."""
     if material.stack is None:
         return float(np.median(material.profile.range(0.5)))
     return float(np.median(material.stack[0].mean_free_path))
@@ -165,32 +163,32 @@ def mean_free_path(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """A profile without what samples cannot resolve."""
+    """The table of a profile without the narrow part that samples cannot resolve."""
 
     r: Array
-    """float64 (n,), mm, each in the middle of the squared distances whose leading bits are the same"""
+    """float64 (n,), mm: the distance of each entry (wgsss/optics/lookup.py)"""
     R: Array
-    """float64 (n, 3), 1/mm^2; as at the first entry before it, 0 from the last"""
+    """float64 (n, 3), 1/mm^2; smaller distances have the value of the first entry, larger ones that of the last, 0"""
     near: Array
-    """float64 (3,), the rest: what is missing to the profile's total"""
+    """float64 (3,): the total reflectance of the profile minus the integral of R"""
 
     @property
     def first(self) -> int:
-        """The leading bits of the first entry's squared distance."""
+        """Leading bits of the first entry's squared distance."""
         return int(leading_bits(np.square(self.r[0])))
 
     @property
     def unit(self) -> float:
-        """1/mm^2: more than any R, of which one step is a share of 2^-9 or less."""
+        """A power of two larger than all R, 1/mm^2: the unit of `packed`."""
         return float(2.0 ** np.ceil(np.log2(max(self.R.max(), 1e-30) * 1.01)))
 
     @property
     def packed(self) -> Array:
-        """uint32 (n,): R in `unit`, three mantissas that share an exponent. What an R is off by is a share of 1/512 of
-        the largest channel's, and no two distances' alike."""
+        """uint32 (n,): R in `unit`, as three mantissas with a common exponent. The error of each channel is at most
+        1/512 of the largest channel's value."""
         R = self.R / self.unit
         most, steps = 2**_EXPONENT - 1, 2**_MANTISSA
-        # One less than all bits of a mantissa, so that rounding cannot reach the next exponent.
+        # Mantissas stay one below 2^_MANTISSA, so that rounding up does not overflow.
         exponent = np.ceil(np.log2(np.maximum(R.max(axis=1), 1e-30) * steps / (steps - 1)))
         shared = np.clip(exponent + most, 0, most)
         mantissa = np.rint(R * 2.0 ** (most + _MANTISSA - shared[:, None])).astype(np.uint32)
@@ -200,8 +198,8 @@ class Kernel:
 
 
 def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
-    """R_d to `size` mm, within `blunt` mm replaced by R_d((r^2 + blunt^2) / (2 blunt)), which is flat in the middle;
-    cached."""
+    """Return the table of R_d up to `size` mm, cached. At distances below `blunt` mm it has R_d((r^2 + blunt^2) /
+    (2 blunt)) instead of R_d(r), which is flat at r = 0."""
 
     def make() -> Arrays:
         return vars(_kernel(profile, blunt, size))
@@ -236,13 +234,13 @@ class Posed:
 
 
 def posed(body: Body, cloud: Cloud) -> Posed:
-    """The samples of a body where they are now, and the boxes around them."""
+    """Return the samples of a body as posed, and the boxes of the octree's nodes."""
     tree, at = cloud.tree, body.at(cloud.samples)
     area = at.area.astype(np.float64)
     if body.mesh.shrunk:
         area[:] = _NO_AREA
     else:
-        area *= body.mesh.area / area.sum()  # cells that cross faces change a little differently from their sample's
+        area *= body.mesh.area / area.sum()  # a sample on several faces was scaled like one of them
     sums = tree.sums(area)
     nodes = {
         "low": tree.lowest(at.position),

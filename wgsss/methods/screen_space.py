@@ -1,13 +1,15 @@
-"""jimenez15's surface: separable diffusion in screen space (Jimenez et al. 2015, Separable Subsurface Scattering).
+"""The surface method of jimenez15: separable diffusion in screen space (Jimenez et al. 2015, Separable Subsurface
+Scattering).
 
-The irradiance at the pixels is blurred along two directions that are at right angles on the surface, by a kernel per
-material whose reach in pixels follows the surface's distance and slope. Unlike the shipped demonstration of 2012 the
-kernel is not scaled by taste: it has the profile's total and, along the directions of the blurs, its response to edges.
+The irradiance at the pixels is blurred along two directions that are perpendicular on the surface, with a kernel for
+each material. The kernel's width in pixels follows from the distance and slope of the surface. Unlike in the published
+demonstration of 2012, its scale is not chosen by eye: it has the total reflectance of the profile and, along the two
+directions, the profile's response to an edge.
 
-A tap reads one pixel for all that it stands for. Where a kernel spans hundreds of pixels, as milk's does on a large
-picture, edges of light and of what is in front come out as faint copies, a tap apart. So an object has 17 taps a
-direction only where half of the light leaves within 8 pixels, 33 within 16, and beyond that 65, which leave next to
-none.
+A tap reads a single pixel for the whole interval to the next tap. Where a kernel spans hundreds of pixels, as milk's
+does in a large picture, shadow edges and silhouettes therefore appear as faint copies, one tap apart. So the number of
+taps per direction is 17 only where half of the light leaves within 8 pixels, 33 where it leaves within 16, and
+otherwise 65, which leaves hardly any copies.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from wgsss.stage import Body, Stage
 
 Array = NDArray[np.float64]
 
-_HALVINGS = 16  # of the search for where taps are placed
+_HALVINGS = 16  # steps of the bisection that places taps
 
 
 @dataclass(frozen=True)
@@ -41,12 +43,12 @@ class ScreenSpace:
         metadata={
             "unit": "",
             "range": (0, 65),
-            "help": "lookups per direction, odd; 0: by the light's reach in pixels",
+            "help": "taps per direction, odd; 0: chosen by the width of the kernel in pixels",
         },
     )
     kernel: str = field(
         default="line-spread",
-        metadata={"unit": "", "choices": tuple(KERNELS), "help": "how a profile becomes two passes"},
+        metadata={"unit": "", "choices": tuple(KERNELS), "help": "how the separable kernel approximates the profile"},
     )
 
     source: ClassVar[str] = "Jimenez et al. 2015, Separable Subsurface Scattering"
@@ -59,17 +61,18 @@ class ScreenSpace:
             raise unknown("kernel", self.kernel, tuple(KERNELS))
 
     def bake(self, stage: Stage) -> None:
-        """Each material's kernel. Its taps may depend on the image."""
+        """Compute each material's kernel. Its taps depend on the frame."""
         for body in stage.bodies:
             self._terms(body)
 
     def weights(self, body: Body, taps: int) -> list[tuple[Taps, Buffer]]:
-        """The kernel of a body's material by so many taps, a term and its buffer for each pair of passes."""
+        """Return the kernel of a body's material with `taps` taps per direction: for each of its terms, which takes two
+        passes, the taps and their buffer."""
 
         def make() -> list[tuple[Taps, Buffer]]:
             terms = self._terms(body)
-            found = [Taps(term, terms[0], taps // 2) for term in terms]
-            return [(t, t.upload(body.stage.gpu)) for t in found]
+            placed = [Taps(term, terms[0], taps // 2) for term in terms]
+            return [(of_term, of_term.upload(body.stage.gpu)) for of_term in placed]
 
         return body.stage.shared(("separable", id(body.material), self.kernel, taps), make)
 
@@ -125,25 +128,26 @@ class ScreenSpace:
 
 
 def taps_for(frame: Frame, body: Body) -> int:
-    """Taps as dense as what they blur asks for: to a side as many as half of the light spreads pixels, up to 32."""
+    """Return the number of taps per direction: at least as many to each side as the pixels within which half of the
+    light leaves, but 32 at most."""
     half = body.stage.shared(("half", id(body.material)), lambda: float(body.material.profile.range(0.5).max()))
     posed = frame.stage.scene.objects[body.index]
     middle = posed.matrix @ np.array([*posed.mesh.bounds.mean(axis=0), 1.0])
     to_clip = frame.view.world_to_clip
-    # Of what the camera is amid, the middle may lie behind it.
+    # The middle of an object around the camera may lie behind it.
     pixels_per_mm = 0.5 * frame.size[1] * np.linalg.norm(to_clip[1, :3]) / max(to_clip[3] @ middle, 1e-6)
     return next((taps for taps in (17, 33) if taps // 2 >= half * pixels_per_mm), 65)
 
 
 class Taps:
-    """A term of a kernel as weights of single pixels, for any number of pixels per mm.
+    """The taps of one term of a kernel at several resolutions, the levels.
 
     Attributes:
-        weight: (levels, 1 + sides, 3) of each of the two pixels that a tap reads, the one in the middle first. The
-            weights of a level sum to the term's integral.
-        offset: (levels, 1 + sides) pixels to either side.
-        pixels_per_mm: (levels,) ascending; at the first the whole kernel is within one pixel.
-        scale: (3,) what the result of the two passes is multiplied by.
+        weight: (levels, 1 + sides, 3): weight of each of the two pixels that a tap reads, from the middle on. The sum
+            over all pixels is the term's integral.
+        offset: (levels, 1 + sides): distance of the pixels from the middle, to both sides.
+        pixels_per_mm: (levels,): resolution, ascending; at the first level the whole kernel is within one pixel.
+        scale: (3,): factor of the result of the two passes.
     """
 
     def __init__(self, term: Term, placed_by: Term, sides: int) -> None:
@@ -151,8 +155,8 @@ class Taps:
         levels = np.arange(known["LEVELS"]) / known["LEVELS_PER_OCTAVE"]
         self.pixels_per_mm = 0.5 / term.x[-1] * 2.0**levels
         self.offset = place(placed_by, self.pixels_per_mm, sides)
-        # An edge lies between two pixels. Wherever it is between one tap and the next, what is read of it is the same:
-        # the mean of what it should be next to the one tap and next to the other.
+        # The sum over the taps is the same for all edges between two neighbouring taps. Weights are chosen such that it
+        # is the mean of the exact responses to edges directly after the one and directly before the other.
         first, last = self.offset + 0.5, np.full_like(self.offset, np.inf)
         last[:, :-1], first[:, -1] = self.offset[:, 1:] - 0.5, np.inf
         read = 0.5 * (_within(term, first, self.pixels_per_mm) + _within(term, last, self.pixels_per_mm))
@@ -161,16 +165,17 @@ class Taps:
         self.scale = term.scale
 
     def upload(self, gpu: Gpu) -> Buffer:
-        """A buffer of array<Tap> of wgsl/screen_space/blur.wgsl, level by level."""
+        """Return a buffer of array<Tap> (wgsl/screen_space/blur.wgsl), level by level."""
         value = {"weight": self.weight.reshape(-1, 3), "offset": self.offset.ravel()}
         return gpu.buffer(wgsl.load("screen_space/blur").layout("array<Tap>").pack(value))
 
 
 def place(term: Term, pixels_per_mm: Array, sides: int) -> Array:
-    """The pixels (L, 1 + sides), from the middle on, that taps read at each number of pixels per mm (L,).
+    """Return the pixels (L, 1 + sides) that taps read, from the middle on, for each resolution in pixels per mm (L,).
 
-    As far apart as leaves the least of the term, in the channel that has most, between one and the next, and half of
-    that beyond the last: no others are as true to an edge wherever it is.
+    The positions minimise the largest error of the response to an edge: in the channel where it is largest, all
+    intervals between neighbouring taps have the same share of the term, and half of that share lies beyond the last
+    tap.
     """
     least, most = np.zeros(pixels_per_mm.shape), np.full(pixels_per_mm.shape, 2.0)
     for _ in range(_HALVINGS):
@@ -181,8 +186,9 @@ def place(term: Term, pixels_per_mm: Array, sides: int) -> Array:
 
 
 def _placed(term: Term, pixels_per_mm: Array, sides: int, between: Array) -> Array:
-    """`place`, given how much of the term may be between one tap and the next (L,); but for the middle, which is as far
-    out as that lets it be, or farther in."""
+    """Return positions of taps as `place` does, such that each interval has at most the share `between` (L,) of the
+    term. They are placed from the outside in: the first column is where the middle tap would be, 0 or less if they
+    suffice."""
     offset: list[Array] = []
     done = term.within[-1] - 0.5 * between[:, None]
     for _ in range(sides + 1):
@@ -194,5 +200,5 @@ def _placed(term: Term, pixels_per_mm: Array, sides: int, between: Array) -> Arr
 
 
 def _within(term: Term, pixels: Array, pixels_per_mm: Array) -> Array:
-    """What a term has (L, n, 3) within so many pixels of the middle (L, n) on both sides."""
+    """Return the part (L, n, 3) of a term within some numbers of pixels (L, n) of the middle, on both sides."""
     return np.stack([np.interp(pixels / pixels_per_mm[:, None], term.x, w) for w in term.within.T], axis=-1)

@@ -1,7 +1,8 @@
-"""deon07's surface: texture-space diffusion by a sum of Gaussians (d'Eon & Luebke 2007; Mikkelsen 2009, 3.4).
+"""The surface method of deon07: diffusion in texture space by a sum of Gaussians (d'Eon & Luebke 2007; Mikkelsen 2009,
+section 3.4).
 
-The irradiance is drawn over the object's atlas, dilated across chart borders, and blurred by ever wider Gaussians, each
-starting from the last result, since the variances of successive Gaussians add up.
+L_d is drawn over the object's atlas, continued across the borders of charts, and blurred with ever wider Gaussians.
+Each blur starts from the result of the last one, since the variances of successive Gaussians add up.
 """
 
 from __future__ import annotations
@@ -12,22 +13,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from wgsss import frame as shared
 from wgsss.bake.charts import Charts
 from wgsss.bake.charts import charts as make_charts
-from wgsss.frame import Frame
+from wgsss.frame import Frame, irradiance_texels
 from wgsss.gpu import Texture
 from wgsss.graph import Bindings, Handle, Outputs
 from wgsss.methods.method import Diffused
 from wgsss.optics import SumOfGaussians, fit_shared_gaussians
 from wgsss.stage import Body, Stage
 
-SIGMA_TEXELS = 2.0  # a Gaussian of at least this sigma may be applied on a smaller map; see the tests of the edge
+SIGMA_TEXELS = 2.0  # the least sigma of a Gaussian on a smaller map, in its texels; see the tests of edges
 MOST_HALVINGS = 2  # smaller maps would lose whole charts
 SLOTS = 6
-"""of the modules that read blurred maps, for Gaussians"""
-# The directions of a separable blur are undefined where the surface faces the axis that they turn about. With another
-# axis for each Gaussian, no place is undefined for all.
+"""the number of blurred maps that shaders read"""
+# The directions of a separable blur are undefined where the normal is parallel to the axis. With a different axis for
+# each Gaussian, no point is affected by all.
 _AXES = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -38,40 +38,40 @@ class TextureSpace:
     map_size: int = field(
         default=1024, metadata={"unit": "texels", "range": (64, 4096), "help": "side of the irradiance map"}
     )
-    gaussians: int = field(default=6, metadata={"unit": "", "range": (1, 6), "help": "Gaussians in the sum"})
+    gaussians: int = field(default=6, metadata={"unit": "", "range": (1, 6), "help": "number of Gaussians in the sum"})
 
     source: ClassVar[str] = "d'Eon & Luebke 2007, GPU Gems 3, chapter 14; Mikkelsen 2009, section 3.4"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = tuple({"map_size": n} for n in (256, 512, 1024, 2048))
 
     def bake(self, stage: Stage) -> None:
-        """Unwrap each mesh and compute its stretch and seams; fit the Gaussians to each material's profile."""
+        """Unwrap each mesh, compute its stretch and seams, and fit the Gaussians to each material's profile."""
         for body in stage.bodies:
             for size in self.sizes(body):
                 atlas(body, size)
 
     def sizes(self, body: Body) -> list[int]:
-        """The size of the map that each Gaussian is applied on: halved, at most twice, while its sigma spans enough
-        texels, since a blurred map has no detail to lose."""
-        found = []
+        """Return the size of the map for each Gaussian. The wide ones use smaller maps, halved at most MOST_HALVINGS
+        times, on which their sigma spans SIGMA_TEXELS or more: a blurred map has no detail to lose."""
+        sizes = []
         for sigma in np.sqrt(self.profile(body).variances):
             halvings = np.log2(max(sigma * self.texels_per_mm(body) / SIGMA_TEXELS, 1.0))
-            found.append(max(self.map_size >> min(int(halvings), MOST_HALVINGS), 1))
-        return found
+            sizes.append(max(self.map_size >> min(int(halvings), MOST_HALVINGS), 1))
+        return sizes
 
     def texels_per_mm(self, body: Body) -> float:
-        """Of a body's irradiance map: the root of how many texels a mm^2 has, at rest."""
+        """Return the resolution of a body's irradiance map at rest: the square root of the mean texels per mm^2."""
 
         def uv_per_mm() -> float:
-            surface = body.unwrap()
-            corners = surface.atlas[surface.faces].astype(np.float64)
+            render_mesh = body.unwrap()
+            corners = render_mesh.atlas[render_mesh.faces].astype(np.float64)
             area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 2
             return float(np.sqrt(area / body.rest.mesh.area))
 
         return self.map_size * body.stage.shared(("uv per mm", id(body.rest.mesh)), uv_per_mm)
 
     def profile(self, body: Body) -> SumOfGaussians:
-        """The sum of Gaussians of a body's material: its own where it has at most as many, shared by the
-        channels, else a fit."""
+        """Return a sum of Gaussians, with variances that the channels share, for the profile of a body's material. It
+        is the profile itself where that is such a sum of at most `gaussians`, otherwise a fit."""
         return body.stage.shared(
             ("fit", id(body.material), self.gaussians),
             lambda: fit_shared_gaussians(body.material.profile, self.gaussians),
@@ -98,16 +98,17 @@ class TextureSpace:
         return frame.draw_object("texture_space/gather", body, into=into, weights=weights, **by_slot(maps))
 
     def blurs(self, frame: Frame, body: Body) -> list[Handle]:
-        """A body's irradiance map, in `lighting.unit`, blurred by each Gaussian of its profile, narrowest first."""
+        """Return a body's irradiance map, in `lighting.unit`, blurred with each Gaussian of its profile, narrowest
+        first."""
 
         def make() -> list[Handle]:
-            return self.blur(frame, body, shared.irradiance_texels(frame, body, self.map_size))
+            return self.blur(frame, body, irradiance_texels(frame, body, self.map_size))
 
         return frame.once(("blurs", self, body.index), make)
 
     def blur(self, frame: Frame, body: Body, irradiance: Handle) -> list[Handle]:
-        """A body's irradiance map blurred by each Gaussian of its profile, narrowest first. Texels without a value stay
-        so, and do not count where others have one."""
+        """Return an irradiance map blurred with each Gaussian of a body's profile, narrowest first. Texels without a
+        value stay without, and the blurs leave them out."""
         graph, sizes = frame.graph, self.sizes(body)
 
         def over(module: str, size: int, label: str = "", **options: Any) -> Outputs:
@@ -144,9 +145,9 @@ class TextureSpace:
 
 
 def atlas(body: Body, size: int) -> Charts:
-    """A body's charts on maps of `size` texels a side."""
-    surface, mesh, stage = body.unwrap(), body.rest.mesh, body.stage
-    return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, surface, size))
+    """Return a body's charts on square maps of `size` texels."""
+    render_mesh, mesh, stage = body.unwrap(), body.rest.mesh, body.stage
+    return stage.shared(("charts", id(mesh), size), lambda: make_charts(stage.gpu, mesh, render_mesh, size))
 
 
 def by_slot(maps: Sequence[Handle | Texture]) -> Bindings:

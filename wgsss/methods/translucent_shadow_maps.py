@@ -1,24 +1,27 @@
-"""deon07's translucency: modified translucent shadow maps (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009, 3.4).
+"""The translucency method of deon07: modified translucent shadow maps (d'Eon & Luebke 2007, 14.5.7; Mikkelsen 2009,
+3.4).
 
-From each light a map is drawn of where its rays first meet an object: the place, its coordinates in the atlas, and the
-normal there. In it a pixel finds the point x_i where light enters that would come straight through to it. The surface's
-irradiance, blurred by each Gaussian, is read at x_i and summed up:
+For each light, a map stores where its rays first hit an object: position, atlas coordinates and normal. A pixel looks
+up the point x_i at which light enters that would arrive at it on a straight line. M_back is the sum of the irradiance
+at x_i, blurred with each Gaussian by the surface method:
 
     M_back = sum_k w_k exp(-d^2 / 2 v_k) (G(v_k) * L_d)(x_i)
 
-The way d is the distance from x_i to x_o times the cosine at x_i: what leaves x_o is taken to be what leaves the point
-below x_i (Mikkelsen 2009, figure 10). That holds where the surface is level. d'Eon and Luebke correct the distance as
-far as the normals at x_i and x_o oppose each other, and so does this: else light that grazes a ball fills its dark
-half. Where x_i and x_o are near each other on the surface, M_front has that light already, and M_back is faded out.
+The distance d is that from x_i to x_o times the cosine at x_i: the light at x_o is taken to be that at the point
+directly below x_i (Mikkelsen 2009, figure 10), which holds on a level surface. As d'Eon & Luebke do, this method
+corrects the distance only as far as the normals at x_i and x_o are opposed; otherwise light that grazes a ball would
+fill its dark half. Where x_i and x_o are close on the surface, M_front contains this light already, and M_back is faded
+out.
 
-Away from the edges of a slab the formula is as far from the integral over the surface as the Gaussians are from the
-profile. For marble it is within 0.1 % at 2 mm; at 8 mm, where 9, 5 and 2 % of what diffuses comes through, by -4, +7
-and +14 % in red, green and blue; at 16 mm by -78, -60 and -23 %, since a dipole's tail outlasts any Gaussian.
+Away from the edges of a slab the formula is as accurate as the Gaussians fit the profile. For marble it is within 0.1 %
+of the integral over the surface at a thickness of 2 mm. At 8 mm, where 9, 5 and 2 % of the diffused light comes
+through, the error is -4, +7 and +14 % in red, green and blue; at 16 mm it is -78, -60 and -23 %, since the tail of a
+dipole decays more slowly than any Gaussian.
 
-What has entered from one light must not be found along another: where there are several, each has blurred maps of its
-own. A single light shares the surface's, and what has entered from the sky shines through along with it; beside several
-lights the sky does not shine through. Area lights are seen from their centre. Other objects cast shadows, through which
-no light comes; the air between two parts of an object counts as a part of it.
+Light that has entered from one source must not be found along the rays of another. With several lights, each has
+blurred maps of its own. A single light shares those of the surface method, and the light of the environment shines
+through along with it; beside several lights the environment does not shine through. Area lights are seen from their
+centres. Other objects cast shadows that no light passes; the air between two parts of an object counts as part of it.
 """
 
 from __future__ import annotations
@@ -42,26 +45,26 @@ from wgsss.stage import Body, Stage
 Source = DirectionalLight | PointLight | RectLight | SphereLight
 
 SIDE = {1: 1024, 6: 512}
-"""of a map, texels, by how many views a light has"""
+"""the size of a light's maps, texels, by the number of its views"""
 
 
 @dataclass(frozen=True)
 class TranslucentShadowMaps:
-    """M_back by the blurred irradiance where each light enters, and the way from there."""
+    """M_back by the blurred irradiance where each light enters, and the distance from there."""
 
     source: ClassVar[str] = "d'Eon & Luebke 2007, GPU Gems 3, chapter 14; Mikkelsen 2009, section 3.4"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = ()
     beside: ClassVar[type] = TextureSpace
 
     def bake(self, stage: Stage) -> None:
-        """Nothing: what the maps need is the surface's."""
+        """Do nothing: the surface method bakes what the maps need."""
 
     def M_back(self, frame: Frame, surface: Method) -> Handle | None:
         assert isinstance(surface, TextureSpace)
-        found = list(_lights(frame))
+        lights = list(_lights(frame))
         M_back = None
-        for light, emitted in found:
-            M_back = _through(frame, surface, light, emitted if len(found) > 1 else None, M_back)
+        for light, emitted in lights:
+            M_back = _through(frame, surface, light, emitted if len(lights) > 1 else None, M_back)
         return M_back
 
 
@@ -146,7 +149,7 @@ def _lit_by(frame: Frame, emitted: list[LightValue]) -> Frame:
 
 
 def _without_sky(body: Body) -> Body:
-    """The body where there is no environment."""
+    """Return the body without light from environments."""
     dark = copy(body)
     dark.environment = body.stage.shared("no sky", lambda: prefilter(body.stage.gpu, NO_SKY, body.material))
     return dark

@@ -1,25 +1,28 @@
-"""jimenez15's translucency: transmittance by thickness (Jimenez et al. 2010, Real-Time Realistic Skin Translucency).
+"""The translucency method of jimenez15: transmittance by thickness (Jimenez et al. 2010, Real-Time Realistic Skin
+Translucency).
 
-At a pixel, the sum over lights of T(d) E. The thickness d is the way, along the light's rays, from where they first
-meet the scene to x_o, by the shadow map; E is what the back receives if it faces the other way than x_o does,
+At a pixel, M_back is proportional to the sum over lights of T(d) E. The thickness d is the distance along the light's
+rays from where they first hit the scene, according to the shadow map, to x_o. E is the irradiance of the back, which is
+taken to have the normal -n:
 
     T(d) = sum_k w_k exp(-d^2 / 2 v_k)        E = max(0.3 - n . l, 0)
 
-times the light's irradiance and rho_dt. T is the integral of the profile over a plane at distance d: that sum where the
-material is one of Gaussians, and of any other profile the integral itself, with no fit. The exponent is that of
-Gaussians of variance v, in mm^2; the shader that is widely copied has exp(-d^2 / v) and a scale set by eye. As in the
-paper, surface diffusion in screen space blurs the sum as if it had entered at the pixels; beside another surface it
-stays sharp.
+times the light's irradiance and rho_dt. T is the integral of the profile over a plane at distance d. For a profile that
+is a sum of Gaussians this is the sum above; for all others it is the integral itself, without a fit. The exponent is
+that of Gaussians of variance v in mm^2; the shader that is widely copied has exp(-d^2 / v) and a scale chosen by eye.
+As in the paper, surface diffusion in screen space blurs the sum as if this light entered at the pixels. Beside other
+surface methods it is not blurred.
 
-Rays are taken below x_o, the shrinking of the paper: by as much as half of the light travels in the medium where they
-graze the surface, and by nothing where they come straight through. Else light that enters next to x_o, where E is not 0
-yet, would pass for light from behind, and add a bright seam to what is thick (the RMSE of a ball is 1.3 % with it, 13 %
-without). It also takes off some of what slanting rays are longer than the medium is thick, which is what counts for T.
+As in the paper, x_o is moved below the surface ("shrinking"): by the distance within which half of the light leaves
+where the light grazes the surface, and not at all where it passes straight through. Otherwise light that enters next to
+x_o, where E is not yet 0, would count as light from behind, and a bright seam would appear on thick objects: the RMSE
+of a ball is 1.3 % with shrinking and 13 % without. It also shortens slanted rays, which are longer than the medium is
+thick; T depends on the thickness.
 
-All that is known of the back is a depth for each ray. What lies in front of an object counts as a part of it, and so
-does the air between: farther than the profile reaches it keeps the light off, as its shadow does; what nearly touches
-lets through what as much of the medium would. Of area lights each part that casts a shadow is a light. The environment
-has no depth map and does not shine through.
+The shadow map is all that is known of the back. Objects in front of an object count as parts of it, and so does the air
+between them: an object farther away than the profile reaches blocks the light, as its shadow does; one that nearly
+touches transmits as much as the same thickness of the medium. Each sample of an area light is a light of its own. The
+environment has no shadow map and does not shine through.
 """
 
 from __future__ import annotations
@@ -43,25 +46,25 @@ from wgsss.stage import Body, Stage
 
 Array = NDArray[np.float64]
 
-_FAINTEST = 1e-5  # share of the profile's total that may go through more than the table ends at
-_ENTRIES = 512
+_FAINTEST = 1e-5  # share of the total reflectance that may pass through more than the table's last thickness
+_ENTRIES = 512  # of the table
 
 
 @dataclass(frozen=True)
 class Transmittance:
-    """M_back by the thickness that shadow maps tell of."""
+    """M_back by the thickness according to the shadow maps."""
 
     source: ClassVar[str] = "Jimenez et al. 2010, Real-Time Realistic Skin Translucency"
     sweep: ClassVar[tuple[dict[str, Any], ...]] = ()
     beside: ClassVar[type] = object
 
     def bake(self, stage: Stage) -> None:
-        """The table of T of each material."""
+        """Compute the table of T of each material."""
         for body in stage.bodies:
             self.table(body)
 
     def table(self, body: Body) -> tuple[dict[str, float], Buffer]:
-        """What a body's material lets through: its lengths, by the names of the shader's parameters, and a buffer."""
+        """Return the lengths of a body's material, by the names of the shader's parameters, and a buffer with T."""
 
         def make() -> tuple[dict[str, float], Buffer]:
             profile = body.material.profile
@@ -81,16 +84,17 @@ class Transmittance:
         return reflect(frame, arriving, label="back")
 
     def M(self, frame: Frame, surface: Method) -> Handle | None:
-        """One blur in screen space of what enters and what arrives from behind is M_front + M_back of two."""
+        """Return M_front + M_back beside ScreenSpace: one blur of the sum of both irradiances instead of two blurs."""
         arriving = self.arriving(frame)
         if arriving is None or not isinstance(surface, ScreenSpace):
             return None
         return surface.diffuse(frame, irradiance_pixels(frame), arriving)
 
     def arriving(self, frame: Frame) -> Handle | None:
-        """What arrives at the pixels from behind, W/m^2, as a share of the profile's total."""
+        """Return the light that arrives at the pixels from behind divided by the total reflectance, W/m^2; None where
+        only environments shine."""
         if not frame.lighting.views:
-            return None  # the sky alone
+            return None
         return frame.once("arriving", lambda: self._arriving(frame))
 
     def _arriving(self, frame: Frame) -> Handle:
@@ -102,11 +106,11 @@ class Transmittance:
 
 
 def table(profile: Profile) -> tuple[Array, Array]:
-    """T over the profile's total (n, 3) at thicknesses (n,), mm, whose square roots are equally spaced from 0; the last
-    is 0.
+    """Return thicknesses (n,), mm, whose square roots are equally spaced from 0, and T (n, 3) there, divided by the
+    total reflectance. The last T is 0.
 
-    A ring of the plane at distance d is farther from x_o by sqrt(r^2 + d^2): the integral over the plane is what leaves
-    farther than d from where light enters.
+    A ring of radius r on the plane at distance d has the distance sqrt(r^2 + d^2) from x_o. The integral of the profile
+    over the plane is therefore the light that leaves farther than d from where it enters.
     """
     reach = float(profile.range(_FAINTEST).max()) or 1.0
     thickness = root_spaced(reach, _ENTRIES)
