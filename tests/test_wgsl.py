@@ -104,13 +104,13 @@ def test_arrays_of_structs_pack_from_dicts_and_structured_arrays(modules):
 @pytest.mark.parametrize(
     ("value", "complaint"),
     [
-        (dict(p=[1, 2, 3]), "wants k, p; got p"),
+        (dict(p=[1, 2, 3]), "has the fields k, p; got p"),
         (dict(p=[1, 2], k=0), r"S.p: expected shape \(3,\)"),
         (dict(p=[1, 2, 3], k=0, x=1), "got k, p, x"),
         (3.0, "expected a dict"),
     ],
 )
-def test_misfits_name_the_field(modules, value, complaint):
+def test_errors_of_packing_name_the_field(modules, value, complaint):
     modules(m="struct S { p: vec3f, k: f32 }")
     with pytest.raises(WgslError, match=complaint):
         wgsl.load("m").layout("S").pack(value)

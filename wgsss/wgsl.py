@@ -49,11 +49,11 @@ _SHORT = {"f": "f32", "i": "i32", "u": "u32", "h": "f16"}
 
 
 class WgslError(Exception):
-    """A fault in a module or in what was given to it: the message names the file and, where known, the line."""
+    """An error in a module or in the values for its bindings; the message names the file and, where known, the line."""
 
 
 def _strip_comments(text: str) -> str:
-    """The text with comments blanked out, newlines kept, so that line numbers hold."""
+    """Return the text without comments, but with all newlines, so that line numbers stay the same."""
     text = re.sub(r"/\*.*?\*/", lambda m: re.sub(r"[^\n]", " ", m.group()), text, flags=re.S)
     return re.sub(r"//[^\n]*", "", text)
 
@@ -64,25 +64,32 @@ def _round_up(value: int, multiple: int) -> int:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where WGSL puts a host-shareable type (WGSL §14.4): size and alignment in bytes, and the matching numpy dtype.
-
-    A runtime-sized array has `count` None, and `size` is that of one element.
-    """
+    """The memory layout of a host-shareable type (WGSL specification, section 14.4) and the matching numpy dtype."""
 
     text: str
+    """the type as WGSL"""
     size: int
+    """bytes; of an array of runtime size, those of one element"""
     align: int
-    dtype: np.dtype
-    fields: tuple[tuple[str, Layout, int], ...] = ()  # of a struct: name, layout, offset
-    element: Layout | None = None  # of an array
+    """bytes"""
+    dtype: np.dtype[Any]
+    fields: tuple[tuple[str, Layout, int], ...] = ()
+    """of a struct: name, layout and offset"""
+    element: Layout | None = None
+    """of an array"""
     count: int | None = 0
-    columns: int = 0  # of a matrix
+    """of an array's elements; None: of runtime size"""
+    columns: int = 0
+    """of a matrix"""
 
     def pack(self, value: Any) -> bytes:
-        """The bytes of `value`: numbers and arrays for scalars, vectors and (mathematical, row by row) matrices, dicts
-        for structs, sequences for arrays; for an array of structs also a structured array or a dict of arrays.
+        """Return `value` as bytes.
 
-        Raises WgslError where names, shapes or counts do not fit.
+        Args:
+            value: a number or array for a scalar, vector or matrix (rows, columns); a dict for a struct; a sequence for
+                an array; for an array of structs also a structured array or a dict of arrays.
+
+        Raises WgslError where names, shapes or counts do not match.
         """
         runtime_sized = self.element is not None and self.count is None
         if runtime_sized and _length(value, self.text) == 0:
@@ -95,9 +102,9 @@ class Layout:
         """Write values into `out`, an array of this layout's dtype or a view of it."""
         if self.fields:
             value = _columns(value, path)
-            wanted = {name for name, _, _ in self.fields}
-            if set(value) != wanted:
-                raise WgslError(f"{path}: wants {', '.join(sorted(wanted))}; got {', '.join(sorted(value))}")
+            names = {name for name, _, _ in self.fields}
+            if set(value) != names:
+                raise WgslError(f"{path} has the fields {', '.join(sorted(names))}; got {', '.join(sorted(value))}")
             for name, layout, _ in self.fields:
                 layout._assign(out[name], value[name], f"{path}.{name}")
         elif self.element is not None:
@@ -114,7 +121,7 @@ class Layout:
 
 
 def _columns(value: Any, path: str) -> Mapping[str, Any]:
-    """A struct's value, or an array of them, by field name."""
+    """Return the value of a struct, or of an array of structs, by field name."""
     if isinstance(value, np.ndarray) and value.dtype.names:
         return {name: value[name] for name in value.dtype.names}
     if isinstance(value, Sequence) and value and isinstance(value[0], Mapping):
@@ -135,26 +142,28 @@ def _length(value: Any, path: str) -> int:
 
 @dataclass(frozen=True)
 class Binding:
-    """One resource that a module declares. `access` is read, write or read_write; `space` is uniform, storage,
-    texture, storage_texture or sampler; `format` is a storage texture's."""
+    """A resource that a module declares."""
 
     name: str
     group: int
     number: int
     space: str
+    """uniform, storage, texture, storage_texture or sampler"""
     access: str
+    """read, write or read_write"""
     type: str
     format: str = ""
+    """of a storage texture"""
 
 
 @dataclass(frozen=True)
 class Module:
-    """A WGSL file with its imports resolved, and what it declares.
+    """A WGSL file with its imports resolved, and its declarations.
 
     Attributes:
-        name: path below `wgsl/`, without the suffix.
-        source: the whole text, imports included.
-        lines: for each line of `source`, the file and line that it came from.
+        name: path below `wgsl/`, without the file extension.
+        source: the text, with that of all imported files.
+        lines: the file and line number of each line of `source`.
     """
 
     name: str
@@ -172,7 +181,7 @@ class Module:
 
     @cached_property
     def constants(self) -> dict[str, int]:
-        """Integer constants, which array and workgroup sizes may name."""
+        """Integer constants, which may be sizes of arrays and workgroups."""
         return {name: int(value) for name, value in _CONST.findall(self._clean)}
 
     @cached_property
@@ -181,7 +190,7 @@ class Module:
 
     @cached_property
     def structs(self) -> dict[str, tuple[tuple[str, str, str], ...]]:
-        """Struct name -> (field name, type as written, attributes)."""
+        """By struct, its fields: name, type as written, attributes."""
         return {
             name: tuple((f[1], re.sub(r"\s+", "", f[2]), f[0]) for f in _FIELD.findall(" ".join(body.split())))
             for name, body in _STRUCT.findall(self._clean)
@@ -189,7 +198,7 @@ class Module:
 
     @cached_property
     def stages(self) -> dict[str, str]:
-        """Stage (vertex, fragment, compute) -> entry point."""
+        """The entry point of each stage (vertex, fragment, compute). A module's own replaces an imported one."""
         return {stage: name for stage, _, name in _ENTRY.findall(self._clean)}
 
     def workgroup_size(self, overrides: Mapping[str, float]) -> tuple[int, int, int]:
@@ -216,7 +225,7 @@ class Module:
 
     @cached_property
     def bindings(self) -> dict[str, Binding]:
-        found = {}
+        bindings = {}
         for group, number, space, access, name, kind in _BINDING.findall(self._clean):
             kind = self.resolve(re.sub(r"\s+", "", kind))
             fmt = ""
@@ -229,8 +238,8 @@ class Module:
                 space = "storage_texture"
             else:
                 space, access = "texture", "read"
-            found[name] = Binding(name, int(group), int(number), space, access, kind, fmt)
-        return found
+            bindings[name] = Binding(name, int(group), int(number), space, access, kind, fmt)
+        return bindings
 
     @cached_property
     def _references(self) -> dict[str, set[str]]:
@@ -266,23 +275,23 @@ class Module:
 
     @cached_property
     def targets(self) -> tuple[tuple[str, str], ...]:
-        """The fragment output: (field name, texture format) by location; the format is the field's type, an alias."""
+        """The outputs of the fragment shader in the order of their locations: name and texture format."""
         match = _RETURNS.search(self._clean)
         if not match:
             return ()
         fields = self.structs.get(match.group(1), ())
-        found = []
+        targets = []
         for name, kind, attributes in fields:
             if "@location" not in attributes:
                 continue
             if not re.fullmatch(r"(RGBA|RG|R)\d+(Float|Uint|Unorm|UnormSrgb)", kind):
                 raise WgslError(f"{self.name}: output '{name}: {kind}' does not name a render target's format")
             location = attributes.split("@location(")[1].split(")")[0]
-            found.append((int(location), name, kind.lower().replace("srgb", "-srgb")))
-        return tuple((name, fmt) for _, name, fmt in sorted(found))
+            targets.append((int(location), name, kind.lower().replace("srgb", "-srgb")))
+        return tuple((name, fmt) for _, name, fmt in sorted(targets))
 
     def resolve(self, kind: str) -> str:
-        """The type with aliases replaced."""
+        """Return a type with its aliases replaced."""
         return re.sub(
             r"\b[A-Za-z_]\w*\b",
             lambda m: self.resolve(self.aliases[m.group()]) if m.group() in self.aliases else m.group(),
@@ -290,7 +299,7 @@ class Module:
         )
 
     def layout(self, kind: str) -> Layout:
-        """The layout of a host-shareable type as this module declares it."""
+        """Return the memory layout of a host-shareable type that this module declares."""
         kind = self.resolve(re.sub(r"\s+", "", kind))
         if kind not in self._layouts:
             self._layouts[kind] = self._compute_layout(kind)
@@ -343,7 +352,7 @@ class Module:
         return Layout(kind, size, align, dtype, tuple(fields))
 
     def explain(self, message: str) -> str:
-        """A compiler's message with its line numbers mapped back: `wgsl:12:3` becomes `blur.wgsl:4:3`."""
+        """Return a compiler's message with the places in the files: `wgsl:12:3` becomes `blur.wgsl:4:3`."""
 
         def place(match: re.Match[str]) -> str:
             line = int(match.group(1))
@@ -353,7 +362,7 @@ class Module:
         return re.sub(r"(?:wgsl)?:(\d+):(\d+)", place, message)
 
 
-def _padded(layout: Layout, stride: int) -> np.dtype:
+def _padded(layout: Layout, stride: int) -> np.dtype[Any]:
     if layout.dtype.itemsize == stride:
         return layout.dtype
     return np.dtype({"names": ["value"], "formats": [layout.dtype], "offsets": [0], "itemsize": stride})
@@ -386,7 +395,13 @@ def _closing(clean: str, start: int, brackets: str) -> int:
 def _resolve(
     name: str, root: Path, done: dict[str, str], chain: tuple[str, ...], asked_by: str
 ) -> list[tuple[str, str, int]]:
-    """Lines of module `name` and of what it imports, each once: (text, file, line)."""
+    """Return the lines of a module after those of the files that it imports: text, file and line number of each.
+
+    Args:
+        done: the texts of the files that are included already, by name; this adds to it.
+        chain: names of the modules whose imports led here.
+        asked_by: the file and line of the import, for errors.
+    """
     if name in chain:
         raise WgslError(f"{asked_by}: circular import {' -> '.join((*chain, name))}")
     if name in done:
@@ -402,24 +417,24 @@ def _resolve(
         line = clean.count("\n", 0, match.end()) + 1
         where = f"{name}.wgsl:{line}"
         names = match.group(2) if match.group(2) is not None else match.group(3)
-        wanted = [n.strip() for n in names.split(",") if n.strip()]
+        imported = [n.strip() for n in names.split(",") if n.strip()]
         target = "/".join(parts)
         out += _resolve(target, root, done, (*chain, name), where)
-        missing = [n for n in wanted if n not in _DECLARATION.findall(done[target])]
+        missing = [n for n in imported if n not in _DECLARATION.findall(done[target])]
         if missing:
             raise WgslError(f"{where}: {target}.wgsl does not declare {', '.join(missing)}")
     done[name] = clean
-    kept = text.split("\n")
+    lines = text.split("\n")
     for match in _IMPORT.finditer(clean):
         for i in range(clean.count("\n", 0, match.start()), clean.count("\n", 0, match.end()) + 1):
-            kept[i] = "" if "import" in kept[i] or not kept[i].strip() else kept[i]
-    return out + [(line, f"{name}.wgsl", i + 1) for i, line in enumerate(kept)]
+            lines[i] = "" if "import" in lines[i] or not lines[i].strip() else lines[i]
+    return out + [(line, f"{name}.wgsl", i + 1) for i, line in enumerate(lines)]
 
 
 def load(name: str, root: Path = ROOT) -> Module:
-    """The module `wgsl/<name>.wgsl` with its imports.
+    """Return the module `wgsl/<name>.wgsl` with its imports.
 
-    Raises WgslError for a missing file, an unknown imported name or a circle of imports, with file and line.
+    Raises WgslError, with file and line, for a missing file, an unknown imported name or a circular import.
     """
     if (name, root) not in loaded:
         lines = _resolve(name, root, {}, (), name)
@@ -429,4 +444,4 @@ def load(name: str, root: Path = ROOT) -> Module:
 
 
 loaded: dict[tuple[str, Path], Module] = {}
-"""modules by name and root, as they were read; what is taken out is read again"""
+"""the modules read so far, by name and root; one that is removed is read again at its next use"""

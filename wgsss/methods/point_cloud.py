@@ -217,10 +217,10 @@ def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
 
     x, w = np.polynomial.legendre.leggauss(64)
     inside = 0.5 * blunt * (x + 1.0)
-    kept = (0.5 * blunt * w * 2.0 * np.pi * inside) @ blunted(inside)
+    flattened = (0.5 * blunt * w * 2.0 * np.pi * inside) @ blunted(inside)
     R = blunted(r)
     R[-1] = 0.0
-    return Kernel(r, R, profile.total * profile.enclosed(blunt) - kept)
+    return Kernel(r, R, profile.total * profile.enclosed(blunt) - flattened)
 
 
 @dataclass(frozen=True, eq=False)
