@@ -162,7 +162,7 @@ def test_a_medium_is_scaled_with_its_mesh(tmp_path: Path, size_mm: float) -> Non
 @pytest.mark.parametrize(
     ("scatter", "volume", "words"),
     [
-        (None, None, "KHR_materials_volume left out, for nothing scatters in it"),
+        (None, None, "KHR_materials_volume left out because nothing scatters in it"),
         ({"multiscatterColor": list(COLOR)}, {"thicknessFactor": 0.1}, "nothing scatters in it"),
         ({"multiscatterColor": list(COLOR)}, {"attenuationColor": list(ATTENUATION)}, "nothing scatters in it"),
         ({}, None, "nothing scatters in it"),

@@ -167,7 +167,7 @@ def test_a_missing_texture_is_said(folder: Path) -> None:
 
 def test_a_missing_material_file_is_said(folder: Path) -> None:
     (folder / "ball.mtl").unlink()
-    assert any("'ball.mtl' is not there" in line for line in told(folder / "ball.obj")[1])
+    assert any("'ball.mtl' does not exist" in line for line in told(folder / "ball.obj")[1])
 
 
 def test_the_constant_colour_of_a_material(folder: Path) -> None:

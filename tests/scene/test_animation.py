@@ -509,11 +509,11 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "too few weights": (
         lambda f: setattr(primitive(f).attributes, "WEIGHTS_0", f.add(np.ones((11, 4)), "VEC4")),
-        "mesh 0, primitive 0: WEIGHTS_0: accessor 7 has 11 rows where 12 belong",
+        "mesh 0, primitive 0: WEIGHTS_0: accessor 7 has 11 rows instead of 12",
     ),
     "negative weight": (
         lambda f: setattr(primitive(f).attributes, "WEIGHTS_0", f.add(-np.ones((12, 4)), "VEC4")),
-        "mesh 0, primitive 0: a joint's weight is below 0",
+        "mesh 0, primitive 0: the weight of a joint is below 0",
     ),
     "weights not finite": (
         lambda f: setattr(primitive(f).attributes, "WEIGHTS_0", f.add(np.full((12, 4), np.nan), "VEC4")),
@@ -521,7 +521,7 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "joint out of range": (
         lambda f: setattr(primitive(f).attributes, "JOINTS_0", f.add(np.full((12, 4), 5), "VEC4", "u1")),
-        "mesh 0, primitive 0: a vertex is carried by joint 5, but skin 0 has 2",
+        "mesh 0, primitive 0: a vertex uses joint 5, but skin 0 has 2",
     ),
     "skin not there": (lambda f: setattr(f.tree.nodes[0], "skin", 3), "mesh 0, primitive 0: there is no skin 3"),
     "joint not a node": (
@@ -552,15 +552,15 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "far too large": (
         lambda f: (setattr(f.tree.nodes[1], "scale", [1e200] * 3), setattr(f.tree.nodes[2], "scale", [1e200] * 3)),
-        "node 2: its place is beyond all bounds",
+        "node 2: its transform is not finite",
     ),
     "too few values": (
         lambda f: setattr(sampler(f), "output", f.add(np.ones((2, 4)), "VEC4")),
-        "animation Bend, channel 0: rotation: accessor 7 has 2 rows where 3 belong",
+        "animation Bend, channel 0: rotation: accessor 7 has 2 rows instead of 3",
     ),
     "values for a spline": (
         lambda f: setattr(sampler(f), "interpolation", "CUBICSPLINE"),
-        "animation Bend, channel 0: rotation: accessor 6 has 3 rows where 9 belong",
+        "animation Bend, channel 0: rotation: accessor 6 has 3 rows instead of 9",
     ),
     "interpolation": (
         lambda f: setattr(sampler(f), "interpolation", "SMOOTH"),
@@ -572,11 +572,11 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "falling times": (
         lambda f: setattr(sampler(f), "input", f.add((0, 2, 1), "SCALAR")),
-        "animation Bend, channel 0: its times must rise, from 0 or later",
+        "animation Bend, channel 0: its times must be at least 0 and must not decrease",
     ),
     "times before the start": (
         lambda f: setattr(sampler(f), "input", f.add((-1, 0, 1), "SCALAR")),
-        "animation Bend, channel 0: its times must rise, from 0 or later",
+        "animation Bend, channel 0: its times must be at least 0 and must not decrease",
     ),
     "no such node": (
         lambda f: setattr(f.tree.animations[0].channels[0].target, "node", 9),
@@ -588,7 +588,7 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
     ),
     "too few morphed": (
         lambda f: setattr(primitive(f), "targets", [{"POSITION": f.add(np.ones((11, 3)), "VEC3")}]),
-        "mesh 0, primitive 0, morph target 0: accessor 7 has 11 rows where 12 belong",
+        "mesh 0, primitive 0, morph target 0: accessor 7 has 11 rows instead of 12",
     ),
     "weights of other targets": (
         lambda f: setattr(f.tree.meshes[0], "weights", [1.0, 1.0]),

@@ -105,7 +105,7 @@ def test_meshopt(tmp_path: Path, name: str) -> None:
         (data[:-5], {}, "damaged: it cannot be decoded"),
         (data, {"filter": "OCTAHEDRAL"}, "damaged: it cannot be decoded"),
         (data, {"mode": "POINTS"}, "mode must be one of ATTRIBUTES, TRIANGLES, INDICES, not POINTS"),
-        (data, {"count": 5}, "its 5 rows of 12 bytes are not the 48 bytes of buffer view 1"),
+        (data, {"count": 5}, "its 5 rows of 12 bytes do not make the 48 bytes of buffer view 1"),
     ):
         assert refused(meshopt(damage, name, False, **fields), tmp_path) == f"buffer view 1: {name}: {message}"
 

@@ -74,15 +74,15 @@ def test_a_later_minor_version_is_read(tmp_path: Path) -> None:
 def test_damaged_containers_are_refused(tmp_path: Path) -> None:
     whole, path = File().shown().glb(), tmp_path / "box.glb"
     for content, message in (
-        (whole[:100], f"damaged: it has 100 bytes, where its header says {len(whole)}"),
-        (whole[:4], "of version 0"),
+        (whole[:100], f"damaged: it has 100 bytes, but its header says {len(whole)}"),
+        (whole[:4], "its version is 0"),
         (whole.replace(b"JSON", b"JUNK", 1), "damaged: it has no JSON chunk"),
-        (whole[:4] + b"\1\0\0\0" + whole[8:], "of version 1"),
+        (whole[:4] + b"\1\0\0\0" + whole[8:], "its version is 1"),
         (whole[:12] + b"\xff\xff\xff\x7f" + whole[16:], "the chunk at byte 12 reaches beyond the end of the file"),
         (whole.replace(b'{"asset"', b'{"asset ', 1), "damaged, or not a .glb file (no valid JSON at line 1, column"),
         (b"[" * 100_000, "damaged: its JSON is nested too deep"),
         (b'{"asset": ' + b'{"a":' * 100_000, "damaged: its JSON is nested too deep"),
-        (b"[1]", "damaged, or not a .glb file (its JSON is no object)"),
+        (b"[1]", "damaged, or not a .glb file (its JSON is not an object)"),
         (b'{"a": ' + b"1" * 10_000 + b"}", "damaged: a number in its JSON has too many digits"),
         (b"this is not a mesh", "damaged, or not a .glb file (no valid JSON at line 1, column 1)"),
         (b"", "the file is empty"),

@@ -106,7 +106,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
                 "values": {"bufferView": 0},
             }
         },
-        "it: accessor 0 sets row 200 of 4",
+        "it: accessor 0 sets row 200, but has 4 rows",
     ),
     "sparse values": (
         {
@@ -176,7 +176,7 @@ def test_what_is_asked_for_must_be_there(tmp_path: Path) -> None:
         (None, {}, "it: there is no accessor null"),
         ("a\nb", {}, "it: there is no accessor 'a\\nb'"),
         ({}, {}, "it: there is no accessor an object"),
-        (0, {"count": 7}, "it: accessor 0 has 1 rows where 7 belong"),
+        (0, {"count": 7}, "it: accessor 0 has 1 rows instead of 7"),
         (0, {}, "it: accessor 0 holds a number that is not finite"),
     ):
         with pytest.raises(InputError) as raised:

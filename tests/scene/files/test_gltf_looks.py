@@ -105,11 +105,11 @@ def test_each_loss_is_one_line_that_counts_its_materials(tmp_path: Path) -> None
     assert sorted(read(lossy, tmp_path).notes) == [
         "KHR_materials_clearcoat left out: used by 2 materials",
         "KHR_materials_transmission left out: used by 2 materials",
-        "KHR_materials_volume left out, for nothing scatters in it: used by 2 materials",
+        "KHR_materials_volume left out because nothing scatters in it: used by 2 materials",
         "VENDOR_thing left out: used by 2 materials",
         "an index of refraction of 0 left out: used by 2 materials",
-        "colours clipped to 0 to 1: of 2 materials",
-        "drawn as if opaque, though alpha blends: 2 materials",
+        "colours clipped to 0 to 1: used by 2 materials",
+        "drawn opaque although alphaMode is BLEND: 2 materials",
         "emission left out: used by 2 materials",
         "metal left out: used by 2 materials",
         "metallic-roughness textures left out: used by 2 materials",
@@ -195,7 +195,7 @@ def test_a_texture_over_coordinates_that_are_not_there_is_left_out(tmp_path: Pat
     without, textured_one = contents.parts
     assert without.look.base_color_map is None
     assert textured_one.look.base_color_map is not None and textured_one.look.base_color_map.coordinates == 1
-    assert contents.notes == ("image 0 left out, for there is no TEXCOORD_1: 1 primitive",)
+    assert contents.notes == ("image 0 left out because there is no TEXCOORD_1: 1 primitive",)
 
 
 def test_images_in_formats_of_extensions(tmp_path: Path) -> None:
@@ -216,7 +216,7 @@ def test_images_in_formats_of_extensions(tmp_path: Path) -> None:
     maps = [part.look.normal_map for part in contents.parts]
     assert [found and found.name for found in maps] == ["image 1", "image 0", "image 0", None, None]
     assert contents.notes == (
-        "texture 5 left out: it has no image that can be read (it is of KHR_texture_basisu)",
+        "texture 5 left out: it has no image that can be read (it uses KHR_texture_basisu)",
         "texture 6 left out: it has no image that can be read",
     )
 

@@ -79,16 +79,16 @@ def test_anisotropy_lessens_scattering_and_keeps_the_colour() -> None:
 @pytest.mark.parametrize(
     ("extensions", "note"),
     [
-        ({VOLUME: WAX}, f"{VOLUME} left out, for nothing scatters in it: used by 1 material"),
-        ({OLD: {}}, f"{OLD} left out, for it says nothing without {VOLUME}: used by 1 material"),
-        ({VOLUME: WAX, OLD: {}}, f"{OLD} left out, for nothing scatters in it: used by 1 material"),
-        ({VOLUME: WAX, SCATTER: {}}, f"{SCATTER} left out, for nothing scatters in it: used by 1 material"),
+        ({VOLUME: WAX}, f"{VOLUME} left out because nothing scatters in it: used by 1 material"),
+        ({OLD: {}}, f"{OLD} left out because it needs {VOLUME}: used by 1 material"),
+        ({VOLUME: WAX, OLD: {}}, f"{OLD} left out because nothing scatters in it: used by 1 material"),
+        ({VOLUME: WAX, SCATTER: {}}, f"{SCATTER} left out because nothing scatters in it: used by 1 material"),
         (
             {VOLUME: {**WAX, "thicknessFactor": 0}, SCATTER: {"scatterStrengthFactor": 1}},
-            f"{SCATTER} left out, for its walls are thin (thicknessFactor 0): used by 1 material",
+            f"{SCATTER} left out because its walls are thin (thicknessFactor 0): used by 1 material",
         ),
         *(
-            ({VOLUME: {**WAX, **change}, OLD: {"multiscatterColor": COLOR}}, f"{OLD} left out, for nothing scatters")
+            ({VOLUME: {**WAX, **change}, OLD: {"multiscatterColor": COLOR}}, f"{OLD} left out because nothing scatters")
             for change in ({"attenuationDistance": 0}, {"attenuationDistance": None}, {"attenuationColor": [1, 1, 1]})
         ),
     ],
@@ -163,8 +163,8 @@ def test_of_two_maps_that_of_the_larger_share_is_taken(tmp_path: Path, share: fl
     contents = read(tmp_path, file, **{DIFFUSE: diffuse})
     found = contents.parts[0].look.base_color_map
     assert (found and found.name) == name
-    expected = () if share == 1 else (f"diffuseTransmissionFactor of {DIFFUSE} taken as {round(share)}: in 1 material",)
-    assert contents.notes == expected
+    rounded = f"diffuseTransmissionFactor of {DIFFUSE} rounded to {round(share)}: used by 1 material"
+    assert contents.notes == (() if share == 1 else (rounded,))
 
 
 def test_diffuse_transmission_without_a_medium_is_noted(tmp_path: Path) -> None:

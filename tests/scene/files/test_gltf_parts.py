@@ -91,8 +91,8 @@ def test_a_file_without_triangles_is_refused(tmp_path: Path) -> None:
         ({"mode": 7}, "mode must be a whole number from 0 to 6, not 7"),
         ({"indices": 50}, "indices: there is no accessor 50"),
         ({"indices": 0}, "indices: accessor 0 must be SCALAR, not 'VEC3'"),
-        ({"faces": (0, 1, 4)}, "a face names vertex 4, where there are 4"),
-        ({"faces": (0, 1, 65535)}, "a face names vertex 65535, where there are 4"),
+        ({"faces": (0, 1, 4)}, "a face has vertex 4, which does not exist (there are 4)"),
+        ({"faces": (0, 1, 65535)}, "a face has vertex 65535, which does not exist (there are 4)"),
         ({"attributes": {"POSITION": "a"}}, "POSITION: there is no accessor 'a'"),
         ({"attributes": {"NORMAL": 1}}, "NORMAL: accessor 1 must be VEC3, not 'SCALAR'"),
         ({"attributes": {"TEXCOORD_0": 0}}, "TEXCOORD_0: accessor 0 must be VEC2, not 'VEC3'"),
@@ -109,7 +109,7 @@ def test_attributes_of_another_length_are_refused(tmp_path: Path) -> None:
     file = File()
     short = file.rows(np.ones((3, 3)), "VEC3")
     file.node(mesh=file.mesh(file.primitive(attributes={"NORMAL": short})))
-    assert refused(file, tmp_path) == "mesh 0, primitive 0: NORMAL: accessor 0 has 3 rows where 4 belong"
+    assert refused(file, tmp_path) == "mesh 0, primitive 0: NORMAL: accessor 0 has 3 rows instead of 4"
 
 
 def test_quantised_positions_normals_and_coordinates(tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def test_hidden_nodes_and_what_is_below_them(tmp_path: Path) -> None:
     file.tree["nodes"][2] |= {"children": [3], "extensions": {"KHR_node_visibility": {"visible": True}}}
     contents = read(file, tmp_path)
     assert [part.name for part in contents.parts] == ["mesh 0, primitive 0"]
-    assert contents.notes == ("left out, for KHR_node_visibility hides them: 3 nodes",)
+    assert contents.notes == ("left out because KHR_node_visibility hides them: 3 nodes",)
 
 
 def test_a_chain_of_ten_thousand_nodes(tmp_path: Path) -> None:
@@ -253,15 +253,18 @@ def test_a_chain_of_ten_thousand_nodes(tmp_path: Path) -> None:
         ([{}, {"children": [2]}, {"children": [1]}, {"children": [1]}], "node 1 is a child of two nodes"),
         ([{}, {"children": [2]}, {"children": [3]}, {"children": [1]}], "node 1 is its own ancestor"),
         ([{"children": [0]}], "node 0 is its own ancestor"),
-        ([{"children": [7]}], "node 0: there is no node 7 to be its child"),
-        ([{"children": [True]}], "node 0: there is no node true to be its child"),
+        ([{"children": [7]}], "node 0: its child, node 7, does not exist"),
+        ([{"children": [True]}], "node 0: its child, node true, does not exist"),
         ([{"children": 7}], "node 0: children must be a list, not 7"),
         ([{"rotation": [0, 0, 0, 0]}], "node 0: rotation is zero"),
         ([{"scale": [1, 1]}], "node 0: scale must be 3 finite numbers"),
         ([{"translation": [1, "a", 2]}], "node 0: translation must be 3 finite numbers"),
         ([{"matrix": [1] * 15}], "node 0: matrix must be 16 finite numbers"),
         ([{"mesh": 5}], "node 0: there is no mesh 5"),
-        ([{"mesh": 0, "scale": [1e200] * 3, "children": [1]}, {"mesh": 0, "scale": [1e200] * 3}], "node 1: its place"),
+        (
+            [{"mesh": 0, "scale": [1e200] * 3, "children": [1]}, {"mesh": 0, "scale": [1e200] * 3}],
+            "node 1: its transform is not finite",
+        ),
         ([5], "node 0 must be an object, not 5"),
         ([{"extensions": 5}], "node 0: extensions must be an object, not 5"),
         ({"a": 1}, "nodes must be a list, not an object"),
@@ -313,7 +316,7 @@ def test_bad_instances_are_named(tmp_path: Path) -> None:
     attributes: dict[str, Any] = {"TRANSLATION": file.rows(np.ones((2, 3)), "VEC3")}
     file.node(mesh=file.mesh(), extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
     for more, message in (
-        ({"SCALE": file.rows(np.ones((3, 3)), "VEC3")}, "SCALE: accessor 3 has 3 rows where 2 belong"),
+        ({"SCALE": file.rows(np.ones((3, 3)), "VEC3")}, "SCALE: accessor 3 has 3 rows instead of 2"),
         ({"SCALE": 50}, "SCALE: there is no accessor 50"),
         ({"SCALE": None, "ROTATION": file.rows(np.zeros((2, 4)), "VEC4")}, "a rotation is zero"),
     ):
@@ -332,4 +335,4 @@ def test_a_few_bytes_cannot_ask_for_more_than_memory_holds(tmp_path: Path) -> No
     mesh = file.mesh(*[file.primitive()] * 1000)
     for _ in range(101):
         file.node(mesh=mesh)
-    assert refused(file, tmp_path) == "its scene places more than 100000 parts or 100000000 triangles"
+    assert refused(file, tmp_path) == "its scene has more than 100000 parts or 100000000 triangles"

@@ -97,7 +97,7 @@ def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_pa
     contents = read(file, tmp_path)
     expected = [(1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
     assert posed(contents, "Bend", 1) == pytest.approx(np.array(expected), abs=1e-6)
-    assert contents.notes == ("without joint weights, and carried by the skin's first joint: 3 vertices",)
+    assert contents.notes == ("without joint weights, moved by the first joint of the skin: 3 vertices",)
 
 
 def test_a_second_set_of_joints(tmp_path: Path) -> None:
@@ -243,10 +243,10 @@ def test_channels_that_move_nothing_here_are_counted(tmp_path: Path) -> None:
         file.tree["animations"][1]["channels"].append({"sampler": 0, "target": target})
     contents = read(file, tmp_path)
     assert contents.notes == (
-        "animation left out, of KHR_animation_pointer: 2 channels",
-        "animation left out, without a node: 1 channel",
-        "animation left out, of an unknown path (visibility): 1 channel",
-        "animation left out, of the morph targets of a node that has none: 1 channel",
+        "left out of animations because they use KHR_animation_pointer: 2 channels",
+        "left out of animations because they have no node: 1 channel",
+        "left out of animations because their path is unknown (visibility): 1 channel",
+        "left out of animations because their node has no morph targets: 1 channel",
     )
     assert [channel.path for channel in contents.animations["More"]()] == ["translation"]
 
@@ -281,7 +281,7 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
     ),
     "negative weight": (
         put(*PRIMITIVE, "attributes", "WEIGHTS_0", value=lambda f: f.rows(-np.ones((4, 4)), "VEC4")),
-        "mesh 0, primitive 0: a joint's weight is below 0",
+        "mesh 0, primitive 0: the weight of a joint is below 0",
     ),
     "weights not finite": (
         put(*PRIMITIVE, "attributes", "WEIGHTS_0", value=lambda f: f.rows(np.full((4, 4), np.nan), "VEC4")),
@@ -289,7 +289,7 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
     ),
     "joint out of range": (
         put(*PRIMITIVE, "attributes", "JOINTS_0", value=lambda f: f.rows(np.full((4, 4), 5), "VEC4", "u1")),
-        "mesh 0, primitive 0: a vertex is carried by joint 5, but skin 0 has 2",
+        "mesh 0, primitive 0: a vertex uses joint 5, but skin 0 has 2",
     ),
     "skin not there": (put("nodes", 0, "skin", value=3), "mesh 0, primitive 0: there is no skin 3"),
     "skin of text": (put("nodes", 0, "skin", value="a"), "mesh 0, primitive 0: there is no skin 'a'"),
@@ -308,15 +308,15 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
     ),
     "far too large": (
         lambda f: [put("nodes", n, "scale", value=[1e200] * 3)(f) for n in (1, 2)] and None,
-        "node 2: its place is beyond all bounds",
+        "node 2: its transform is not finite",
     ),
     "too few values": (
         put(*SAMPLER, "output", value=lambda f: f.rows(np.ones((3, 4)), "VEC4")),
-        "animation Bend, channel 0: rotation: accessor 7 has 3 rows where 2 belong",
+        "animation Bend, channel 0: rotation: accessor 7 has 3 rows instead of 2",
     ),
     "values for a spline": (
         put(*SAMPLER, "interpolation", value="CUBICSPLINE"),
-        "animation Bend, channel 0: rotation: accessor 6 has 2 rows where 6 belong",
+        "animation Bend, channel 0: rotation: accessor 6 has 2 rows instead of 6",
     ),
     "interpolation": (
         put(*SAMPLER, "interpolation", value="SMOOTH"),
@@ -328,11 +328,11 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
     ),
     "falling times": (
         put(*SAMPLER, "input", value=lambda f: f.rows((1, 0), "SCALAR")),
-        "animation Bend, channel 0: its times must rise, from 0 or later",
+        "animation Bend, channel 0: its times must be at least 0 and must not decrease",
     ),
     "times before the start": (
         put(*SAMPLER, "input", value=lambda f: f.rows((-1, 0), "SCALAR")),
-        "animation Bend, channel 0: its times must rise, from 0 or later",
+        "animation Bend, channel 0: its times must be at least 0 and must not decrease",
     ),
     "no such node": (put(*CHANNEL, "target", "node", value=9), "animation Bend, channel 0: there is no node 9"),
     "no such sampler": (put(*CHANNEL, "sampler", value=9), "animation Bend, channel 0: there is no sampler 9"),
@@ -340,7 +340,7 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
     "sampler of text": (put(*SAMPLER, value="a"), "animation Bend, sampler 0 must be an object, not 'a'"),
     "too few morphed": (
         put(*PRIMITIVE, "targets", value=lambda f: [{"POSITION": f.rows(np.ones((3, 3)), "VEC3")}]),
-        "mesh 0, primitive 0, morph target 0: accessor 7 has 3 rows where 4 belong",
+        "mesh 0, primitive 0, morph target 0: accessor 7 has 3 rows instead of 4",
     ),
     "weights of other targets": (
         put("meshes", 0, "weights", value=[1.0, 1.0]),
@@ -366,4 +366,4 @@ def test_primitives_of_one_mesh_have_the_same_targets(tmp_path: Path) -> None:
     path = file.save(tmp_path / "arm.glb")
     with pytest.raises(InputError) as raised:
         read_gltf(path)
-    assert str(raised.value) == f"{path}: mesh 0, primitive 1: it has 1 morph targets where its mesh has 0"
+    assert str(raised.value) == f"{path}: mesh 0, primitive 1: it has 1 morph targets, but its mesh has 0"

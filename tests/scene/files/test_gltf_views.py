@@ -51,11 +51,11 @@ def test_what_of_a_light_is_left_out_is_noted(tmp_path: Path) -> None:
     contents = read(lit(spot), tmp_path)
     assert contents.lights[0].kind == "point" and contents.lights[0].power == (5, 5, 5)
     assert contents.notes == (
-        "taken for point lights, their cones left out: 1 spot light",
-        "range left out: of 1 light",
+        "drawn as point lights, without their cones: 1 spot light",
+        "range left out: used by 1 light",
     )
     flat = read(lit({"type": "directional"}, scale=[1, 1, 0]), tmp_path)
-    assert flat.lights == () and flat.notes == ("left out, for it has no direction: 1 light",)
+    assert flat.lights == () and flat.notes == ("left out because it has no direction: 1 light",)
 
 
 def test_lights_of_hidden_nodes_and_of_other_scenes_are_dark(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_cameras_that_see_nothing_are_noted(tmp_path: Path) -> None:
     file.node(camera=1)
     file.node(camera=2, scale=[0, 0, 0])
     contents = read(file, tmp_path)
-    assert contents.cameras == () and contents.notes == ("left out, for they see nothing: 3 cameras",)
+    assert contents.cameras == () and contents.notes == ("left out because they see nothing: 3 cameras",)
 
 
 @pytest.mark.parametrize(

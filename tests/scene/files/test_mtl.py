@@ -40,7 +40,7 @@ def test_one_number_stands_for_three(tmp_path: Path) -> None:
 def test_a_black_colour_beside_a_texture_is_white(tmp_path: Path) -> None:
     look, notes = read(tmp_path, "Kd 0 0 0\nmap_Kd t.png", "t.png")
     assert look.base_color == (1, 1, 1) and notes == [
-        "material m: Kd 0 0 0 would make its texture black, and is taken as 1 1 1"
+        "material m: Kd 0 0 0 would make its texture black and is replaced by 1 1 1"
     ]
     assert read(tmp_path, "Kd 0 0 0")[0].base_color == (0, 0, 0)
 
@@ -82,7 +82,7 @@ def test_textures_that_are_not_files(tmp_path: Path) -> None:
     (tmp_path / "folder.png").mkdir()
     for name in ("gone.png", "folder.png", "/dev/zero", "x" * 300, "a\0b"[:1] + ".png", "."):
         look, (note,) = read(tmp_path, f"map_Kd {name}")
-        assert look.base_color_map is None and "is not there, and left out" in note
+        assert look.base_color_map is None and "does not exist and is left out" in note
 
 
 OPTIONS = (
@@ -140,17 +140,17 @@ def test_opacity_in_the_alpha_of_the_colours_cuts_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "note"),
     [
-        ("d 0.5", "transparency (d, Tr) is left out, it is drawn opaque"),
-        ("d -halo 0.5", "transparency (d, Tr) is left out, it is drawn opaque"),
-        ("Tr 0.5", "transparency (d, Tr) is left out, it is drawn opaque"),
+        ("d 0.5", "transparency (d, Tr) is left out: the material is drawn opaque"),
+        ("d -halo 0.5", "transparency (d, Tr) is left out: the material is drawn opaque"),
+        ("Tr 0.5", "transparency (d, Tr) is left out: the material is drawn opaque"),
         ("Ke 1 0 0", "emission (Ke) is left out"),
         ("Tf 1 .5 1", "transmission filter (Tf) is left out"),
         ("Pm 1", "metallic (Pm) is left out"),
         ("Ns 96\nKs .5 .5 .5", "Phong highlights (Ks, Ns) are left out"),
-        ("Kd 2 0 0", "Kd is not within 0 to 1, and is clipped"),
-        ("Kd spectral file.rfl 1", "'kd spectral file.rfl 1' is not understood, and left out"),
-        ("Kd 1 2", "'kd 1 2' is not understood, and left out"),
-        ("Kd nan 0 0", "'kd nan 0 0' is not understood, and left out"),
+        ("Kd 2 0 0", "Kd is outside 0 to 1 and is clipped"),
+        ("Kd spectral file.rfl 1", "'kd spectral file.rfl 1' is not understood and is left out"),
+        ("Kd 1 2", "'kd 1 2' is not understood and is left out"),
+        ("Kd nan 0 0", "'kd nan 0 0' is not understood and is left out"),
         ("map_Pr r.png", "the texture 'r.png' (map_pr) is left out"),
         ("disp -mm 0 2 h.png", "the texture 'h.png' (disp) is left out"),
         ("refl -type sphere sky.png", "the texture 'sky.png' (refl) is left out"),
@@ -169,12 +169,13 @@ def test_one_note_tells_of_many_materials(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("".join(f"newmtl m{i}\nd 0.5\n" for i in range(5)))
     looks, notes = read_materials(tmp_path / "a.mtl")
     assert len(looks) == 5
-    assert notes == ["materials m0, m1, m2 and 2 more: transparency (d, Tr) is left out, it is drawn opaque"]
+    assert notes == ["materials m0, m1, m2 and 2 more: transparency (d, Tr) is left out: the material is drawn opaque"]
 
 
 def test_of_two_materials_with_one_name_the_first_counts(tmp_path: Path) -> None:
     look, notes = read(tmp_path, "Kd 1 0 0\nnewmtl m\nKd 0 1 0")
-    assert look.base_color == (1, 0, 0) and notes == ["material m: it is defined more than once, and the first counts"]
+    assert look.base_color == (1, 0, 0)
+    assert notes == ["material m: it is defined more than once, and the first definition is used"]
 
 
 @pytest.mark.parametrize("data", [b"", b"newmtl a\0"])

@@ -116,7 +116,7 @@ def test_corners_may_leave_fields_out_each_face_in_its_own_way(tmp_path: Path) -
     contents = read(tmp_path, text)
     part = contents.parts[0]
     assert len(part.faces) == 4 and contents.splits
-    assert contents.notes == ("2 of 4 faces have no texture coordinates: 0 0 is taken for theirs",)
+    assert contents.notes == ("2 of 4 faces have no texture coordinates and get 0 0",)
     given = np.linalg.norm(part.normals[part.faces], axis=2)
     np.testing.assert_array_equal(given, [[0, 0, 0], [1, 1, 1], [1, 1, 1], [0, 0, 0]])
     np.testing.assert_array_equal(part.uvs[0][part.faces[1]], [[0, 0]] * 3)
@@ -131,7 +131,7 @@ def test_vertices_are_split_only_where_corners_differ(tmp_path: Path) -> None:
 def test_texture_coordinates_of_one_and_three_numbers_and_those_that_are_not_finite(tmp_path: Path) -> None:
     contents = read(tmp_path, SQUARE + "vt .25\nvt 1 .5 7\nvt nan 0\nvt 1.#INF 0\nf 1/1 2/2 3/3 4/4\n")
     np.testing.assert_array_equal(contents.parts[0].uvs[0], [[0.25, 1], [1, 0.5], [0, 1], [0, 1]])
-    assert contents.notes == ("2 texture coordinates are not finite numbers: 0 is taken for them",)
+    assert contents.notes == ("2 texture coordinates are not finite numbers and become 0",)
 
 
 def test_positions_that_are_not_finite_are_kept_for_the_check_of_the_mesh(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_positions_that_are_not_finite_are_kept_for_the_check_of_the_mesh(tmp_pa
 def test_vertex_colours_are_srgb(tmp_path: Path) -> None:
     contents = read(tmp_path, "v 0 0 0 1 0 .5\nv 1 0 0 0 0 0 1\nv 0 1 0\nf 1 2 3\n")
     np.testing.assert_allclose(contents.parts[0].colors, [[1, 0, 0.214041], [0, 0, 0], [1, 1, 1]], atol=1e-6)
-    assert contents.notes == ("1 of 3 vertices have no colour: white is taken",)
+    assert contents.notes == ("1 of 3 vertices have no colour and become white",)
 
 
 def test_vertex_colours_from_0_to_255(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
         "1 lines are left out",
         "2 free-form curves or surfaces are left out",
         "1 calls of other programs are left out",
-        "1 lines are not understood and left out ('F')",
+        "1 lines are not understood and are left out ('F')",
         "weights of vertices (v x y z w) are ignored",
         "1 faces of fewer than three corners are left out",
         "2 unused vertices are left out",
@@ -209,7 +209,7 @@ def test_materials_become_parts(tmp_path: Path) -> None:
 
 def test_materials_that_are_not_there(tmp_path: Path) -> None:
     contents = read(tmp_path, "mtllib gone.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
-    assert contents.notes == ("the material file 'gone.mtl' is not there",)
+    assert contents.notes == ("the material file 'gone.mtl' does not exist",)
     contents = read(tmp_path, SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
     assert contents.notes == ("no .mtl file describes materials a, b",)
     assert [part.look.name for part in contents.parts] == ["a", "b"]
@@ -250,7 +250,7 @@ def test_a_damaged_material_file_does_not_hide_the_mesh(tmp_path: Path) -> None:
         (SQUARE + "f 1/2/3/4 2 3\n", "line 5: '1/2/3/4' is not a corner of a face"),
         (SQUARE + "f /1 2 3\n", "line 5: '/1' is not a corner of a face"),
         ("v 1,5 0 0\n", "line 1: '1,5' is not a number"),
-        ("# c\nv 1 0\n", "line 2: 2 numbers where there must be at least 3"),
+        ("# c\nv 1 0\n", "line 2: 2 numbers where at least 3 are needed"),
         (SQUARE, "the mesh is empty: it has no faces, 4 vertices"),
         (SQUARE + "l 1 2\n", "the mesh is empty: it has no faces, 4 vertices; 1 lines are left out"),
         (SQUARE + "f 1 2\n", "the mesh is empty: no face has three corners"),

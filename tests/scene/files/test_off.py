@@ -91,7 +91,7 @@ def test_normals_colours_and_texture_coordinates(tmp_path: Path) -> None:
 
 def test_what_is_left_out_is_noted(tmp_path: Path) -> None:
     assert read(tmp_path, off(vertices=[f"{v} 9" for v in VERTICES])).notes == (
-        "what 4 vertices have after their 3 numbers is left out",
+        "4 vertices have more than 3 numbers: the rest is left out",
     )
     assert read(tmp_path, off() + "0 1\n").notes == ("1 lines after the last face are left out",)
 
@@ -103,22 +103,22 @@ def test_what_is_left_out_is_noted(tmp_path: Path) -> None:
         (off("4OFF\n4 1 0"), "OFF files of more than three dimensions are not supported"),
         (off("nOFF\n3\n4 1 0"), "OFF files of more than three dimensions are not supported"),
         ("OFF\n", "damaged: the numbers of vertices and faces are missing"),
-        ("OFF\n8\n", "line 2: 1 numbers where there must be at least 2"),
-        ("OFF\n4.5 1 0\n", "line 2: the numbers of vertices and faces are not whole"),
-        ("OFF\n-4 1 0\n", "line 2: the numbers of vertices and faces are not whole"),
-        ("OFF\nnan 1e300 0\n", "line 2: the numbers of vertices and faces are not whole"),
+        ("OFF\n8\n", "line 2: 1 numbers where at least 2 are needed"),
+        ("OFF\n4.5 1 0\n", "line 2: the numbers of vertices and faces are not whole numbers"),
+        ("OFF\n-4 1 0\n", "line 2: the numbers of vertices and faces are not whole numbers"),
+        ("OFF\nnan 1e300 0\n", "line 2: the numbers of vertices and faces are not whole numbers"),
         ("<html>\n", "damaged, or not an .off file: its first word is neither 'OFF' nor a number"),
         (b"\x89PNG\0\1", "damaged: it is not a text file"),
         (" \n# c\n", "the file is empty"),
-        (off("OFF\n4 100000000000 0"), "truncated: 5 of 100000000004 lines of vertices and faces are there"),
+        (off("OFF\n4 100000000000 0"), "truncated: it has 5 of 100000000004 lines of vertices and faces"),
         (off(faces=["4 0 1 2 4"]), "line 7: vertex 4 does not exist (there are 4)"),
         (off(faces=["4 0 1 2 -1"]), "line 7: vertex -1 does not exist (there are 4)"),
-        (off(faces=["5 0 1 2 3"]), "line 7: a face of 5 corners, with 4 numbers after it"),
-        (off(faces=["-4 0 1 2 3"]), "line 7: a face of -4 corners, with 4 numbers after it"),
+        (off(faces=["5 0 1 2 3"]), "line 7: a face of 5 corners, but 4 numbers follow"),
+        (off(faces=["-4 0 1 2 3"]), "line 7: a face of -4 corners, but 4 numbers follow"),
         (off(faces=["4 0 1 2 3.5"]), "line 7: '3.5' is not a whole number"),
-        (off(vertices=["0 0", *VERTICES[1:]]), "line 3: 2 numbers where there must be at least 3"),
+        (off(vertices=["0 0", *VERTICES[1:]]), "line 3: 2 numbers where at least 3 are needed"),
         (off(vertices=["0 0 x", *VERTICES[1:]]), "line 3: 'x' is not a number"),
-        (off("COFF\n4 1 0"), "line 3: 3 numbers where there must be at least 6"),
+        (off("COFF\n4 1 0"), "line 3: 3 numbers where at least 6 are needed"),
         (off("OFF\n4 0 0", faces=[]), "the mesh is empty: it has no faces"),
     ],
 )

@@ -179,7 +179,7 @@ def test_texture_coordinates_of_corners_split_vertices(tmp_path: Path, form: str
     part = contents.parts[0]
     np.testing.assert_array_equal(part.positions[part.faces], np.array(SQUARE)[[[0, 1, 2], [0, 2, 3], [3, 1, 2]]])
     np.testing.assert_array_equal(part.uvs[0][part.faces[1]], [[0, 1], [0.5, 0.5], [0, 0]])
-    assert contents.notes == ("1 of 3 faces have no texture coordinates: 0 0 is taken for theirs",)
+    assert contents.notes == ("1 of 3 faces have no texture coordinates and get 0 0",)
     assert part.faces[0, 0] == part.faces[1, 0] and part.faces[0, 2] != part.faces[1, 1]
 
 
@@ -194,7 +194,7 @@ def test_a_part_for_each_texture(tmp_path: Path, form: str) -> None:
     maps = [part.look.base_color_map for part in contents.parts]
     assert [texture and texture.name for texture in maps] == [None, "skin.png", "my eye.png", None]
     assert [len(part.faces) for part in contents.parts] == [1, 1, 1, 1]
-    assert contents.notes == ("the texture 'gone.png' is not there, and left out",)
+    assert contents.notes == ("the texture 'gone.png' does not exist and is left out",)
 
 
 def test_one_texture_for_all(tmp_path: Path) -> None:

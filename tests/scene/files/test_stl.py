@@ -115,15 +115,15 @@ def test_truncation_anywhere(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (binary(count=3), "truncated, or not an .stl file: 2 of 3 facets are there"),
-        (binary(count=2**32 - 1), "truncated, or not an .stl file: 2 of 4294967295 facets are there"),
+        (binary(count=3), "truncated, or not an .stl file: it has 2 of 3 facets"),
+        (binary(count=2**32 - 1), "truncated, or not an .stl file: it has 2 of 4294967295 facets"),
         (binary()[:84].replace(b"\2", b"\0"), "the mesh is empty: it has no facets"),
         (b"solid a\nendsolid a\n", "the mesh is empty: it has no facets"),
         (b"hello", "damaged, or not an .stl file"),
         (b"", "the file is empty"),
         (ascii_solid().replace(b"0.000 ", b"zero ", 1), "line 4: 'zero' is not a number"),
-        (ascii_solid().replace(b" 0.000 0\n", b"\n", 1), "line 4: 1 numbers where there must be at least 3"),
-        (ascii_solid().replace(b"    outer loop\n", b"", 1), "line 3: a vertex that is in no 'outer loop'"),
+        (ascii_solid().replace(b" 0.000 0\n", b"\n", 1), "line 4: 1 numbers where at least 3 are needed"),
+        (ascii_solid().replace(b"    outer loop\n", b"", 1), "line 3: a vertex outside any 'outer loop'"),
     ],
 )
 def test_damage_is_one_line(tmp_path: Path, data: bytes, message: str) -> None:

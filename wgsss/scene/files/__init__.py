@@ -1,4 +1,4 @@
-"""Reading mesh files, one module per format, into what `contents` describes."""
+"""Readers of mesh files, one module per format. Each returns a `Contents`."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ SUFFIXES = tuple(_READERS)
 
 
 def read_file(path: Path) -> Contents:
-    """What a mesh file holds. Raises InputError, naming the file, for one that is missing, of another format, damaged
-    or without faces."""
+    """Read a mesh file of any supported format.
+
+    Raises InputError, naming the file, if it is missing, has another format, is damaged or has no faces.
+    """
     name = _READERS.get(path.suffix.lower())
     if name is None:
         raise InputError(f"{path}: not a mesh format that can be read ({' '.join(SUFFIXES)})")

@@ -1,4 +1,4 @@
-"""Vertex colours of files as linear ones."""
+"""Conversion of the vertex colours of files to linear colours."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ Array = npt.NDArray[Any]
 
 
 def linear(display: Array) -> Array:
-    """Linear colours of sRGB ones, both 0 to 1 (IEC 61966-2-1)."""
+    """Convert sRGB colours to linear colours, both 0 to 1 (IEC 61966-2-1)."""
     return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0.0) + 0.055) / 1.055) ** 2.4)
 
 
 def linear_colors(colors: Array, srgb: bool, notes: list[str]) -> Array:
-    """Linear colours (V, 3) within 0 to 1 of a file's, which are sRGB or linear: white where one is not finite.
+    """Convert vertex colours (V, 3) of a file to linear colours, clipped to 0 to 1.
 
-    Floating-point colours that are much above 1 are taken to be sRGB from 0 to 255. What is changed is noted.
+    `srgb` says whether the file's colours are sRGB or linear. Colours that are not finite become white. If a colour is
+    above 2, all are read as sRGB from 0 to 255. A note is added for each of these changes.
     """
     if (colors > 2).any():
-        notes.append("vertex colours beyond 1 are taken to go from 0 to 255")
+        notes.append("vertex colours exceed 1 and are read as 0 to 255")
         colors, srgb = colors / 255.0, True
     finite = np.isfinite(colors).all(axis=1, keepdims=True)
     within = np.clip(np.where(finite, colors, 1.0), 0.0, 1.0)
     changed = np.count_nonzero((within != colors).any(axis=1))
     if changed:
-        notes.append(f"{changed} vertex colours are not within 0 to 1: they are clipped, or white where not finite")
+        notes.append(f"{changed} vertex colours are outside 0 to 1: they are clipped, or white if not finite")
     return linear(within) if srgb else within

@@ -1,6 +1,6 @@
-"""What a mesh file holds, whatever its format: parts, what they look like, lights, cameras and animations.
+"""The contents of a mesh file of any format: parts, their materials, lights, cameras and animations.
 
-A reader loses nothing in silence: what a file has and these classes cannot hold becomes one of `Contents.notes`.
+Readers drop nothing silently: data of a file that these classes cannot hold are reported in `Contents.notes`.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ Array = npt.NDArray[Any]
 Triple = tuple[float, float, float]
 
 NONE = "none"
-"""stands for no animation, where one is asked for by its name: none is called so"""
+"""the name that stands for no animation; no animation of a file gets this name"""
 
 
 @dataclass(frozen=True)
 class Texture:
-    """An image over texture coordinates. Two are equal where they show the same in the same place."""
+    """An image and its placement over texture coordinates. Two textures are equal if image and placement are equal."""
 
     source: bytes | Path
-    """the encoded image itself, or its file"""
+    """the encoded image, or the path of its file"""
     name: str
-    """for messages: "image 2 (skin.png)" """
+    """name in messages, such as "image 2 (skin.png)" """
     channels: str = "RGB"
-    """which of the image's channels count: "RGB", "L" (their luminance) or "A" (alpha)"""
+    """channels of the image that are used: "RGB", "L" (luminance) or "A" (alpha)"""
     coordinates: int = 0
-    """which set of the part's texture coordinates it lies over"""
+    """number of the set of texture coordinates"""
     transform: tuple[Triple, Triple] | None = None
-    """rows of a matrix (2, 3): its coordinates are that times (u, v, 1) of the set, v down"""
+    """rows of a matrix (2, 3) that is multiplied with (u, v, 1) of the set, v down; None for the identity"""
     wrap: tuple[str, str] = ("repeat", "repeat")
-    """what is beyond 0 to 1, along u and v: one of material.WRAPS"""
+    """continuation beyond 0 to 1 along u and along v, each one of material.WRAPS"""
     nearest: bool = False
-    """whether it is not interpolated between its texels"""
+    """whether lookups take the nearest texel and do not interpolate"""
 
 
 @dataclass(frozen=True)
 class Medium:
-    """What is below a surface, in 1 / the file's unit of length."""
+    """The coefficients of a medium below a surface, in 1 / the file's unit of length."""
 
     sigma_a: Triple
     """absorption"""
@@ -56,15 +56,15 @@ class Medium:
 
 @dataclass(frozen=True)
 class Look:
-    """A file's material, as far as wgsss has a use for it; None where the file does not say."""
+    """The properties of a file's material that wgsss uses. None means that the file does not define a property."""
 
     name: str = ""
     base_color: Triple = (1.0, 1.0, 1.0)
-    """linear; multiplies the map"""
+    """linear RGB; multiplies the map"""
     base_color_map: Texture | None = None
     normal_map: Texture | None = None
     normal_scale: float = 1.0
-    """of the normal map's x and y"""
+    """factor of x and y of the normal map"""
     specular: float | None = None
     """scale of the specular lobe, 0 to 1; multiplies the map"""
     specular_map: Texture | None = None
@@ -73,50 +73,50 @@ class Look:
     eta: float | None = None
     """index of refraction"""
     alpha: float = 1.0
-    """multiplies the alpha of the base colour map, where `cutoff` asks for it"""
+    """factor of the alpha of the base colour map; used only with `cutoff`"""
     cutoff: float | None = None
-    """the alpha below which there is no surface; None where alpha does not matter"""
+    """alpha below which there is no surface; None if alpha is ignored"""
     medium: Medium | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Triangles of one look, as the file has them, in its own unit."""
+    """Triangles with one look, as stored in the file and in the unit of the file."""
 
     name: str
-    """for messages: "mesh 0, primitive 1", "group lid" """
+    """name in messages, such as "mesh 0, primitive 1" or "material skin" """
     positions: Array
-    """float64 (V, 3), in the part's own space"""
+    """float64 (V, 3), in the space of the part"""
     faces: Array
     """int64 (F, 3)"""
     look: Look = Look()
     matrix: Array = field(default_factory=lambda: np.eye(4))
-    """float64 (4, 4): from the part's own space to that of the file, at rest"""
+    """float64 (4, 4): transform from the space of the part to that of the file, at rest"""
     normals: Array | None = None
-    """float64 (V, 3), in the part's own space, of any length; zero where a vertex has none"""
+    """float64 (V, 3), in the space of the part, of any length; zero for a vertex without normal"""
     uvs: Mapping[int, Array] = field(default_factory=dict)
-    """float64 (V, 2) by number of the set, v down (0 at the image's top row)"""
+    """float64 (V, 2) for each number of a set, v down (0 at the top row of the image)"""
     colors: Array | None = None
     """float64 (V, 3), linear, 0 to 1"""
 
 
 @dataclass(frozen=True)
 class LightSource:
-    """A light of the file, in its unit and space."""
+    """A light of the file, in the unit and space of the file."""
 
     name: str
     kind: str
     """ "directional" or "point" """
     position: Triple
     direction: Triple
-    """in which the light travels; for a point light without meaning"""
+    """direction in which the light travels; unused for point lights"""
     power: Triple
-    """linear RGB: W/m^2 of a directional light on a surface facing it, W/sr of a point light"""
+    """linear RGB: irradiance in W/m^2 on a facing surface (directional), or radiant intensity in W/sr (point)"""
 
 
 @dataclass(frozen=True)
 class CameraView:
-    """A camera of the file, in its unit and space. One of `fov` and `height` is None."""
+    """A camera of the file, in the unit and space of the file. Either `fov` or `height` is None."""
 
     name: str
     eye: Triple
@@ -124,28 +124,28 @@ class CameraView:
     """unit vector"""
     up: Triple
     fov: float | None
-    """vertical, degrees, of a perspective camera"""
+    """vertical field of view of a perspective camera, in degrees"""
     height: float | None
-    """of what an orthographic camera sees, the file's unit"""
+    """height of the view of an orthographic camera, in the unit of the file"""
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """All of a file that wgsss can use, and notes on what it cannot."""
+    """The data of a file that wgsss uses, and notes on those that it does not use."""
 
     parts: tuple[Part, ...]
-    """those with faces, at least one"""
+    """the parts with faces, at least one"""
     mm_per_unit: float = 1.0
-    """millimetres per unit of length: what the format says, or 1 where it says nothing"""
+    """millimetres per unit of length; 1 if the format defines no unit"""
     states_unit: bool = False
-    """whether the format says what its unit is"""
+    """whether the format defines its unit"""
     splits: bool = False
-    """whether vertices may be repeated for a reason: seams, hard edges, a format without indices"""
+    """whether vertices may be repeated on purpose: seams, hard edges, a format without indices"""
     lights: tuple[LightSource, ...] = ()
     cameras: tuple[CameraView, ...] = ()
     rig: Rig | None = None
-    """what moves the parts, its own parts in the same order; None where nothing does"""
+    """the rig that moves the parts, its parts in the same order; None if nothing moves"""
     animations: Mapping[str, Callable[[], tuple[Channel, ...]]] = field(default_factory=dict)
-    """by name, or number where there is none; each reads its channels when called"""
+    """functions that read the channels of an animation, by its name, or by its number if it has no name"""
     notes: tuple[str, ...] = ()
-    """what was left out or taken otherwise than the file says, one line each"""
+    """one line for each kind of data that was left out or changed"""

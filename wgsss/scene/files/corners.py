@@ -1,4 +1,4 @@
-"""From corners that index positions, texture coordinates and normals apart to vertices that have one of each."""
+"""Conversion of corners with separate indices of position, texture coordinate and normal to vertices with one index."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Array = npt.NDArray[Any]
 
 
 def vertices_of(columns: Sequence[Array]) -> tuple[Array, Array]:
-    """The distinct rows of whole numbers >= -1, given as columns (C,): where each first is (V,), and each row's (C,).
+    """Find the distinct rows of a table of integers >= -1 that is given as columns (C,).
 
-    Vertices are in the order of the first column, then of the next.
+    Returns the index (V,) of the first row of each kind, and for each row (C,) the number of its kind. Kinds are sorted
+    by the first column, then by the next.
     """
     key = columns[0] + 1
     for column in columns[1:]:
@@ -26,28 +27,28 @@ def vertices_of(columns: Sequence[Array]) -> tuple[Array, Array]:
     return first, inverse
 
 
-def picked(values: Array, indices: Array) -> Array:
-    """Rows of values (N, k) by index, 0 where the index is -1."""
+def take_rows(values: Array, indices: Array) -> Array:
+    """Return the rows of values (N, k) at the indices; 0 where an index is -1."""
     if not len(values):
         return np.zeros((len(indices), values.shape[1]))
     return np.where((indices >= 0)[:, None], values[indices], 0.0)
 
 
-def upside_down(uvs: Array) -> Array:
-    """Texture coordinates (N, 2) whose v points up as such whose v points down, and the other way round."""
+def flip_v(uvs: Array) -> Array:
+    """Replace v by 1 - v in texture coordinates (N, 2), which converts between v up and v down."""
     return np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
 
 
 def finite_uvs(uvs: Array, notes: list[str]) -> Array:
-    """Texture coordinates (N, 2) with 0 for those that are not finite as float32, which a note counts."""
+    """Replace texture coordinates (N, 2) that are not finite as float32 by 0, and count them in a note."""
     finite = _finite(uvs)
     if not finite.all():
-        notes.append(f"{np.count_nonzero(~finite)} texture coordinates are not finite numbers: 0 is taken for them")
+        notes.append(f"{np.count_nonzero(~finite)} texture coordinates are not finite numbers and become 0")
     return np.where(finite, uvs, 0.0)
 
 
 def finite_normals(normals: Array, notes: list[str]) -> Array:
-    """Normals (N, 3) with 0, for none, where they are not finite as float32, which a note counts."""
+    """Replace normals (N, 3) that are not finite as float32 by 0, which means none, and count them in a note."""
     finite = _finite(normals)
     if not finite.all():
         notes.append(f"{np.count_nonzero(~finite)} normals are not finite numbers and are left out")

@@ -1,4 +1,4 @@
-"""Finding the files that a file names, as they are written by programs of other systems."""
+"""Search for the files that a file refers to, in the spellings of programs on other systems."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from urllib.parse import unquote
 
 
 def locate(name: str, folder: Path) -> Path | None:
-    """The regular file that a name, relative to a folder, means; None where there is none.
+    """Find the regular file that a name refers to, relative to a folder. Return None if there is none.
 
-    Tried in turn: the name as it is, percent-decoded, with slashes for backslashes, its last part beside the file, and
-    each of these in another letter case.
+    The function tries in turn: the name as it is, percent-decoded, with slashes for backslashes, and its last part in
+    the folder itself. If none of these exists, it tries them again and ignores the case of letters.
     """
     spellings = list(dict.fromkeys(_spellings(name)))
     for find in (_as_written, _in_other_case):
         for spelling in spellings:
             try:
-                found = find(folder, spelling)
-            except (OSError, ValueError):  # too long, a NUL in it, a folder that may not be read
+                file = find(folder, spelling)
+            except (OSError, ValueError):  # the name is too long or contains a NUL, or a folder cannot be read
                 continue
-            if found is not None:
-                return found
+            if file is not None:
+                return file
     return None
 
 
@@ -38,20 +38,20 @@ def _as_written(folder: Path, name: str) -> Path | None:
 
 
 def _in_other_case(folder: Path, name: str) -> Path | None:
-    """The file whose folders and name are these but for the case of their letters, the first by name of several."""
-    path = PurePosixPath(name)
-    if path.is_absolute():
+    """Find a file by its path, ignoring the case of letters. Of several, return the first by name."""
+    relative = PurePosixPath(name)
+    if relative.is_absolute():
         return None
-    found = [folder]
-    for part in path.parts:
+    matches = [folder]
+    for part in relative.parts:
         if part == "..":
-            found = [at / part for at in found]
+            matches = [path / part for path in matches]
         else:
-            found = [
-                here
-                for at in found
-                if at.is_dir()
-                for here in sorted(at.iterdir())
-                if here.name.casefold() == part.casefold()
+            matches = [
+                entry
+                for path in matches
+                if path.is_dir()
+                for entry in sorted(path.iterdir())
+                if entry.name.casefold() == part.casefold()
             ]
-    return next((at for at in found if at.is_file()), None)
+    return next((path for path in matches if path.is_file()), None)

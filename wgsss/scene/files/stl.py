@@ -1,4 +1,4 @@
-"""Reading STL files, binary and ASCII. Each triangle brings its own corners; normals of facets are not read.
+"""Reader of STL files, binary and ASCII. Each triangle has its own three vertices; facet normals are not read.
 
 Source: "StereoLithography Interface Specification" (3D Systems, 1989).
 """
@@ -18,16 +18,16 @@ from wgsss.scene.files.triangulate import triangulate
 
 Array = npt.NDArray[Any]
 
-_HEADER = 84  # bytes: 80 of text, and the number of facets
+_HEADER = 84  # bytes: 80 of text, then the number of facets
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(path: Path) -> Contents:
-    """All facets of a file, as one part. Raises InputError where the file is missing, damaged, or has none."""
+    """Read all facets of a file as one part. Raises InputError if it is missing, is damaged or has no facets."""
     data = file_bytes(path)
     notes: list[str] = []
     count = int.from_bytes(data[80:_HEADER], "little")
-    # Binary files may start with "solid" too, but have the length that the number of facets asks for.
+    # Binary files may start with "solid", too. Their length, which the number of facets determines, identifies them.
     if len(data) != _HEADER + count * _FACET.itemsize and _is_text(data):
         positions, faces = _ascii(path, data, notes)
     else:
@@ -43,18 +43,18 @@ def _is_text(data: bytes) -> bool:
 
 
 def _binary(path: Path, data: bytes, count: int, notes: list[str]) -> tuple[Array, Array]:
-    there = max(len(data) - _HEADER, 0) // _FACET.itemsize
+    complete = max(len(data) - _HEADER, 0) // _FACET.itemsize
     if len(data) < _HEADER:
         raise InputError(f"{path}: damaged, or not an .stl file")
-    if there < count:
-        raise InputError(f"{path}: truncated, or not an .stl file: {there} of {count} facets are there")
+    if complete < count:
+        raise InputError(f"{path}: truncated, or not an .stl file: it has {complete} of {count} facets")
     facets = np.frombuffer(data, _FACET, count, _HEADER)
     if len(data) > _HEADER + facets.nbytes:
         notes.append(f"{len(data) - _HEADER - facets.nbytes} bytes after the last facet are left out")
     colored = np.count_nonzero(facets["attribute"])
     if colored or b"COLOR=" in data[:80]:
         notes.append(f"colours (attributes) of {colored} facets are left out" if colored else "the colour is left out")
-    with np.errstate(invalid="ignore"):  # positions that are not finite are the caller's to find
+    with np.errstate(invalid="ignore"):  # the caller checks that positions are finite
         positions = facets["corners"].reshape(-1, 3).astype(np.float64)
     return positions, np.arange(3 * count).reshape(-1, 3)
 
@@ -64,7 +64,7 @@ def _ascii(path: Path, data: bytes, notes: list[str]) -> tuple[Array, Array]:
     rows, loops = (np.flatnonzero(text.row_starts_with(word)) for word in (b"vertex", b"outer"))
     loop = np.searchsorted(loops, rows) - 1
     if len(rows) and loop[0] < 0:
-        raise text.error(text.first[rows[0]], "a vertex that is in no 'outer loop'")
+        raise text.error(text.first[rows[0]], "a vertex outside any 'outer loop'")
     counts = np.bincount(loop, minlength=len(loops))
     bad = np.flatnonzero(counts < 3)
     if len(bad):

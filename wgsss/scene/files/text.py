@@ -1,4 +1,4 @@
-"""Splitting a text file into words with numpy: the formats OBJ, OFF, ASCII PLY and ASCII STL are read from these."""
+"""Splitting of text files into words with numpy, for the readers of OBJ, OFF, ASCII PLY and ASCII STL."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
-# How Microsoft's C library writes numbers that are not finite. Their '#' starts no comment.
+# Numbers that are not finite, as Microsoft's C library writes them. Their '#' does not start a comment.
 _MSVC = re.compile(rb"([-+]?)\d\.#(IND|QNAN|SNAN|INF)\w*|([-+]?)nan\(\w*\)", re.IGNORECASE)
 
 
 def file_bytes(path: Path) -> bytes:
-    """All of a regular file. Raises InputError where it is missing, empty or cannot be read."""
+    """Read the bytes of a regular file. Raises InputError if it is missing or empty, or cannot be read."""
     require_file(path)
     try:
         return path.read_bytes()
@@ -29,45 +29,45 @@ def file_bytes(path: Path) -> bytes:
 
 
 def decoded(name: bytes) -> str:
-    """A name in a text file that does not say its encoding: UTF-8, or else Latin-1."""
+    """Decode a name in a text file of unknown encoding: as UTF-8 if it is valid, else as Latin-1."""
     try:
         return name.decode("utf-8")
     except UnicodeDecodeError:
         return name.decode("latin-1")
 
 
-def shown(name: bytes | str) -> str:
-    """A word of a file as a message can show it: on one line, and not too long."""
+def printable(name: bytes | str) -> str:
+    """Return a word of a file for a message: at most 60 characters, and "?" for those that cannot be printed."""
     text = decoded(name) if isinstance(name, bytes) else name
     text = "".join(letter if letter.isprintable() else "?" for letter in text)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def without_comment(name: str) -> str:
-    """A name up to a '#' after a blank. Whether that is a comment or part of the name only the names in use tell."""
+    """Return a name up to the first '#' after a blank. That may be a comment or part of the name: callers try both."""
     return re.split(r"\s#", name, maxsplit=1)[0].rstrip()
 
 
 class Text:
-    """The words of a text file, in rows. A row is a line that is not blank; where `continued`, a line that ends with a
-    backslash goes on in the next one. '#' starts a comment.
+    """The words of a text file in R rows. A row is a line that is not blank, and '#' starts a comment.
 
-    Raises InputError where the data is not text.
+    If `continued` is set, a line that ends with a backslash continues in the next line. `first_line` is the number of
+    the first line. Raises InputError if the data is not text.
     """
 
     def __init__(self, path: Path, data: bytes, continued: bool = False, first_line: int = 1) -> None:
-        data = data.rstrip(b"\0\x1a")  # with which some programs end a text
+        data = data.rstrip(b"\0\x1a")  # some programs end a text with these
         if b"\0" in data:
             raise InputError(f"{path}: damaged: it is not a text file")
         self.path, self._first_line = path, first_line
         self.raw = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         plain = self.raw
-        # What is replaced keeps its length, so that places in `raw` and `plain` are the same.
+        # Replacements keep the length, so that an offset means the same place in `raw` and in `plain`.
         if b"#" in plain:
-            plain = re.sub(rb"#(?!IND|QNAN|SNAN|INF)[^\n]*", lambda found: b" " * len(found[0]), plain)
+            plain = re.sub(rb"#(?!IND|QNAN|SNAN|INF)[^\n]*", lambda match: b" " * len(match[0]), plain)
         if continued and b"\\" in plain:
             plain = plain.replace(b"\v", b" ")
-            plain = re.sub(rb"\\[ \t]*\n", lambda found: b" " * (len(found[0]) - 1) + b"\v", plain)
+            plain = re.sub(rb"\\[ \t]*\n", lambda match: b" " * (len(match[0]) - 1) + b"\v", plain)
         self.codes: Array = np.frombuffer(plain, np.uint8)
         space = np.concatenate([[True], self.codes <= 32, [True]])
         change = np.flatnonzero(space[1:] != space[:-1])
@@ -76,12 +76,12 @@ class Text:
         edges = np.concatenate([[0], np.searchsorted(self.starts, breaks), [len(self.starts)]])
         first = edges[np.concatenate([[True], edges[1:] != edges[:-1]])]
         self.first = first
-        """int64 (R + 1,): the first word of each row, and the number of words"""
+        """int64 (R + 1,): the index of the first word of each row, then the number of words"""
         self.widths = np.diff(first)
-        """int64 (R,): the words of each row"""
+        """int64 (R,): the number of words of each row"""
 
     def row_starts_with(self, word: bytes) -> Array:
-        """bool (R,): whether the first word of a row is this one."""
+        """Return, for each row, whether its first word is `word`: bool (R,)."""
         start, end = self.starts[self.first[:-1]], self.ends[self.first[:-1]]
         same = end - start == len(word)
         for i, code in enumerate(word):
@@ -89,16 +89,17 @@ class Text:
         return same
 
     def word(self, index: int) -> bytes:
+        """Return the word at an index."""
         return self.raw[self.starts[index] : self.ends[index]]
 
     def rest(self, row: int) -> str:
-        """What follows a row's first word up to the end of the line, comments included: names may hold any letter."""
+        """Return the text after the first word of a row up to the end of the line, including a comment."""
         start = self.ends[self.first[row]]
         end = self.raw.find(b"\n", start)
         return decoded(self.raw[start : end if end >= 0 else None].strip())
 
     def words(self, indices: Array, separator: bytes = b" ") -> list[bytes]:
-        """The words of rising indices, split further at a separator."""
+        """Return the words at rising indices, split further at a separator of one byte."""
         if not len(indices):
             return []
         starts, ends = self.starts[indices], self.ends[indices]
@@ -112,13 +113,17 @@ class Text:
         return np.where(inside, codes, np.uint8(32)).tobytes().split()
 
     def numbers(self, indices: Array) -> Array:
-        """float64 (N,): the words of rising indices as numbers. Raises InputError for one that is no number."""
+        """Convert the words at rising indices to float64 (N,). Raises InputError if a word is not a number."""
         return self.converted(self.words(indices), float, indices)
 
     def converted(self, words: Sequence[bytes], kind: Callable[[bytes], Any], indices: Array) -> Array:
-        """float64 or int64 (N,): `words`, of which each lies in the word of the file that `indices` names."""
+        """Convert N words to float64 or int64 (N,), according to `kind` (float or int).
+
+        `indices` (N,) are the words of the file that contain them, for errors. Raises InputError if a word is not a
+        number of this kind.
+        """
         try:
-            if b"_" in self.raw and b"_" in b" ".join(words):  # which Python takes within numbers
+            if b"_" in self.raw and b"_" in b" ".join(words):  # Python accepts underscores in numbers
                 raise ValueError
             return np.array(list(map(kind, words)), np.int64 if kind is int else np.float64)
         except (ValueError, OverflowError):
@@ -134,31 +139,31 @@ class Text:
             value = kind(word)
             return np.int64(value) if kind is int else value
         except OverflowError:
-            raise self.error(index, f"'{shown(word)}' is out of range") from None
+            raise self.error(index, f"'{printable(word)}' is out of range") from None
         except ValueError:
-            raise self.error(index, f"'{shown(word)}' is not a {'whole ' * (kind is int)}number") from None
+            raise self.error(index, f"'{printable(word)}' is not a {'whole ' * (kind is int)}number") from None
 
     def table(self, rows: Array, least: int, most: int, skip: int = 1) -> tuple[Array, Array]:
-        """The numbers of some rows after their first `skip` words, float64 (N, most), 0 where a row has fewer, and how
-        many each row has (N,). Those beyond `most` are not read.
+        """Read up to `most` numbers of each of N rows, after their first `skip` words.
 
-        Raises InputError where a row has fewer than `least`.
+        Returns the numbers as float64 (N, most), with 0 where a row has fewer, and the count of numbers in each row
+        (N,), including those beyond `most`. Raises InputError if a row has fewer than `least`.
         """
         widths = self.widths[rows] - skip
         short = np.flatnonzero(widths < least)
         if len(short):
-            has = max(widths[short[0]], 0)
-            raise self.error(self.first[rows[short[0]]], f"{has} numbers where there must be at least {least}")
-        there = np.arange(most) < widths[:, None]
-        values = np.zeros(there.shape)
-        values[there] = self.numbers((self.first[rows][:, None] + skip + np.arange(most))[there])
+            count = max(widths[short[0]], 0)
+            raise self.error(self.first[rows[short[0]]], f"{count} numbers where at least {least} are needed")
+        present = np.arange(most) < widths[:, None]
+        values = np.zeros(present.shape)
+        values[present] = self.numbers((self.first[rows][:, None] + skip + np.arange(most))[present])
         return values, widths
 
     def line(self, index: int) -> int:
-        """The number of the line, from 1, in which a word stands."""
+        """Return the number of the line that contains a word, counted from 1."""
         before = self.codes[: self.starts[index]]
         return self._first_line + int(np.count_nonzero(before == 10) + np.count_nonzero(before == 11))
 
-    def error(self, index: int, what: str) -> InputError:
-        """An error that names the line in which a word stands."""
-        return InputError(f"{self.path}: line {self.line(index)}: {what}")
+    def error(self, index: int, message: str) -> InputError:
+        """Make an error that names the line that contains a word."""
+        return InputError(f"{self.path}: line {self.line(index)}: {message}")

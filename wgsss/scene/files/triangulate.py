@@ -1,7 +1,7 @@
-"""Splitting polygons into triangles: convex ones as a fan, all others by ear clipping in the plane that fits them.
+"""Triangulation of polygons: a fan for convex polygons, ear clipping in a coordinate plane for all others.
 
-Ear clipping is mapbox-earcut's. It may cut triangles without area off corners that lie on a straight line, so those
-corners are left out first, and split the triangles beside them afterwards.
+Ear clipping is that of mapbox-earcut. It may make triangles without area at corners on a straight line. These corners
+are therefore removed before, and afterwards inserted into the edges of the triangles.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from wgsss.errors import InputError
 
 Array = npt.NDArray[Any]
 
-STRAIGHT = 1e-5  # height over length of the triangle of three corners, below which they lie on a line
-MAX_FANS = 300  # of which the one with the least area is looked for
-MAX_CORNERS = 100_000  # of a face that is not convex: the time of ear clipping may grow with their square
+STRAIGHT = 1e-5  # three corners lie on a line if the height of their triangle over its length is below this
+MAX_FANS = 300  # corners of a polygon for which the fan with the least area is searched
+MAX_CORNERS = 100_000  # corners of a face that is not convex: ear clipping may take quadratic time
 
 
 def triangulate(path: Path, positions: Array, corners: Array, counts: Array, notes: list[str]) -> tuple[Array, Array]:
-    """Triangles of faces, whose `corners` (C,) are indices into positions (V, 3) and follow one another by `counts`.
+    """Split faces into triangles.
 
-    Returns int64 (T, 3), the places of their corners in `corners`, wound as the faces are, and int64 (T,), the face of
-    each, rising. Faces of fewer than three corners are left out, which a note counts. A face without an area gives
-    triangles without one. Raises InputError, naming the file, where no face is left, and for a face of more than
-    MAX_CORNERS that is not convex.
+    `corners` (C,) are indices into positions (V, 3), face after face; `counts` (F,) are the numbers of corners of the
+    faces. Returns int64 (T, 3), indices into `corners`, with the winding of the faces, and int64 (T,), the face of each
+    triangle, in order. Faces of fewer than three corners are left out and counted in a note. A face without area gives
+    triangles without area. Raises InputError, naming the file, if no face is left, or if a face that is not convex has
+    more than MAX_CORNERS corners.
     """
     if not len(counts):
         raise InputError(f"{path}: the mesh is empty: it has no faces")
@@ -63,12 +64,13 @@ def triangulate(path: Path, positions: Array, corners: Array, counts: Array, not
 
 
 def _fan(count: int) -> Array:
+    """Return the triangles (count - 2, 3) of a fan from the first corner."""
     after = np.arange(1, count - 1)
     return np.stack([np.zeros_like(after), after, after + 1], axis=1)
 
 
 def _least_fan(points: Array) -> Array:
-    """The fan from that corner of a polygon (N, 3) from which its triangles have the least area."""
+    """Return the fan of a polygon (N, 3) whose triangles have the least total area, over all start corners."""
     count = len(points)
     if count > MAX_FANS:
         return _fan(count)
@@ -81,36 +83,37 @@ def _least_fan(points: Array) -> Array:
 
 
 def _flattened(points: Array) -> tuple[Array, Array, Array]:
-    """Polygons (F, N, 3) in the coordinate plane that they face most, float64 (F, N, 2) and counter-clockwise there;
-    which of their corners lie on a straight line between their neighbours, bool (F, N); and which polygons are neither
-    strictly convex nor beyond help, bool (F,).
+    """Project polygons (F, N, 3) onto the coordinate plane that each faces most.
 
-    A coordinate is left out instead of turning the polygon, so that no rounding moves its corners off a line.
+    Returns the projections, float64 (F, N, 2), counter-clockwise; for each corner whether it lies on a straight line
+    between its neighbours, bool (F, N); and for each polygon whether it needs ear clipping, bool (F,): it is finite and
+    not strictly convex. Projection drops one coordinate. A rotation would round, and move corners off a line.
     """
     with np.errstate(all="ignore"):
         points = points - points[:, :1]
         size = np.abs(points).max(axis=(1, 2), keepdims=True)
-        points = np.ldexp(points, -np.frexp(size)[1])  # by a power of 2, which rounds nothing
-        normal = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)  # Newell's
+        points = np.ldexp(points, -np.frexp(size)[1])  # scaling by a power of 2 does not round
+        normal = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)  # Newell's method
         axis = np.abs(normal).argmax(axis=1)
         backwards = np.take_along_axis(normal, axis[:, None], axis=1)[:, 0] < 0
-        kept = np.stack([axis + 1, axis + 2], axis=1) % 3
-        kept = np.where(backwards[:, None], kept[:, ::-1], kept)
-        plane = np.take_along_axis(points, kept[:, None, :], axis=2)
+        axes = np.stack([axis + 1, axis + 2], axis=1) % 3
+        axes = np.where(backwards[:, None], axes[:, ::-1], axes)
+        plane = np.take_along_axis(points, axes[:, None, :], axis=2)
         to_here, to_next = plane - np.roll(plane, 1, axis=1), np.roll(plane, -1, axis=1) - plane
         turn = to_here[..., 0] * to_next[..., 1] - to_here[..., 1] * to_next[..., 0]
         ahead = np.einsum("fnk,fnk->fn", to_here, to_next)
         span = np.square(to_here + to_next).sum(axis=-1)
         straight = (np.abs(turn) <= STRAIGHT * span) & (ahead > 0)
-        once = np.arctan2(turn, ahead).sum(axis=1) < 3 * np.pi  # a star turns in one direction too, but twice
+        once = np.arctan2(turn, ahead).sum(axis=1) < 3 * np.pi  # a pentagram turns in one direction, too, but twice
         convex = ((turn > 0) & ~straight).all(axis=1) & once
         return plane, straight, ~convex & np.isfinite(plane).all(axis=(1, 2))
 
 
 def _clipped(points: Array, plane: Array, straight: Array) -> Array:
-    """Triangles int64 (T, 3) of one polygon (N, 3), which is counter-clockwise in a plane (N, 2).
+    """Triangulate one polygon (N, 3) by ear clipping, given its counter-clockwise projection (N, 2): int64 (T, 3).
 
-    All its edges are edges of triangles, even where it crosses itself in that plane, so that no hole opens beside it.
+    Every edge of the polygon is an edge of a triangle, even if the projection crosses itself, so that no hole opens
+    next to it.
     """
     count = len(plane)
     distinct = np.flatnonzero((points != np.roll(points, 1, axis=0)).any(axis=1))
@@ -118,7 +121,7 @@ def _clipped(points: Array, plane: Array, straight: Array) -> Array:
         return distinct[_clipped(points[distinct], plane[distinct], straight[distinct])]
     ring = np.flatnonzero(~straight)
     if len(ring) < 3 or len(distinct) < 3:
-        return _fan(count)  # without an area, which is for the caller to find
+        return _fan(count)  # triangles without area, which the caller drops
     ends = np.array([len(ring)], np.uint32)
     cut = mapbox_earcut.triangulate_float64(np.ascontiguousarray(plane[ring]), ends).reshape(-1, 3)
     if len(cut) < len(ring) - 2:

@@ -1,4 +1,4 @@
-"""Reading image files: textures of any depth (`read_map`), radiance and skies from .hdr and .exr files."""
+"""Readers of image files: textures of any bit depth (`read_map`), and radiance and skies from .hdr and .exr files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cubes of six faces as latitude-longitude images."""
+"""Conversion of cube maps to latitude-longitude images."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from wgsss.errors import InputError
 
 Array = npt.NDArray[Any]
 
-# Of the faces +x, -x, +y, -y, +z, -z of OpenEXR's cubes (ImfEnvmap): the direction in which columns and in which rows
-# of a face grow, as axis and sign.
+# For each of the faces +x, -x, +y, -y, +z, -z of the cubes of OpenEXR (ImfEnvmap): the directions in which the column
+# and the row increase, each as axis and sign.
 _FACES = (
     ((2, 1), (1, -1)),
     ((2, -1), (1, -1)),
@@ -24,14 +24,14 @@ _FACES = (
 
 
 def lat_long_of_cube(pixels: Array) -> npt.NDArray[np.float32]:
-    """float32 (2 S, 4 S, 3) from the six faces (6 S, S, 3) of OpenEXR's cube, one below the other.
+    """Resample the six faces (6 S, S, 3) of an OpenEXR cube, one below the other, to float32 (2 S, 4 S, 3).
 
-    As in OpenEXR, the first and last texels of a face lie on its edges, and the middle of the image is +z of the cube;
-    it is -z of the scene. Raises InputError for other shapes.
+    As in OpenEXR, the first and last texels of a face lie on its edges. The centre of the result is +z of the cube,
+    which is -z of the scene. Raises InputError for other shapes.
     """
     height, side = pixels.shape[:2]
     if height != 6 * side:
-        raise InputError(f"{side} x {height} pixels are no cube: its six faces are one below the other")
+        raise InputError(f"{side} x {height} pixels are not a cube: it must have six square faces, one below the other")
     faces = pixels.reshape(6, side, side, 3)
     v, u = np.meshgrid(
         (np.arange(2 * side) + 0.5) / (2 * side), (np.arange(4 * side) + 0.5) / (4 * side), indexing="ij"
@@ -41,17 +41,18 @@ def lat_long_of_cube(pixels: Array) -> npt.NDArray[np.float32]:
     d = np.stack([sine * np.sin(longitude), np.cos(np.pi * v), sine * np.cos(longitude)], axis=-1)
     axis = np.abs(d).argmax(axis=-1)
     face = 2 * axis + (np.take_along_axis(d, axis[..., None], -1)[..., 0] < 0.0)
-    found = np.empty((2 * side, 4 * side, 3), np.float32)
+    image = np.empty((2 * side, 4 * side, 3), np.float32)
     for i, (across, down) in enumerate(_FACES):
         here = face == i
         w = d[here]
         depth = np.abs(w[:, i // 2])
         x, y = (np.clip((sign * w[:, k] / depth + 1.0) / 2.0, 0.0, 1.0) * (side - 1) for k, sign in (across, down))
-        found[here] = _bilinear(faces[i], x, y)
-    return found
+        image[here] = _bilinear(faces[i], x, y)
+    return image
 
 
 def _bilinear(face: Array, x: Array, y: Array) -> Array:
+    """Interpolate a face (S, S, 3) at positions x and y (N,), in texels."""
     last = len(face) - 1
     left, top = np.minimum(x.astype(int), max(last - 1, 0)), np.minimum(y.astype(int), max(last - 1, 0))
     right, below = np.minimum(left + 1, last), np.minimum(top + 1, last)

@@ -1,4 +1,4 @@
-"""OpenEXR files: which of their channels are the picture, its place in the display window, and its colours."""
+"""Reader of OpenEXR files. It chooses the channels of a picture, crops to the display window and converts colours."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from wgsss.scene.images.files import MAX_SIDE, MAX_SKY_SIDE, check_size
 
 Array = npt.NDArray[Any]
 
-_MOST_BYTES = 4 << 30  # of all channels of a file, which are decoded together
-# What a picture consists of, by the names of its channels, the first being what it is looked for by.
+_MOST_BYTES = 4 << 30  # limit for all channels of a file, which are decoded together
+# Names of the channels of each kind of picture. The first kind whose channels all exist is used.
 _KINDS = (("R", "G", "B"), ("r", "g", "b"), ("Y", "RY", "BY"), ("X", "Y", "Z"), ("Y",))
-# Layers that are the picture where a file has several, from the likeliest; in lower case.
+# Names of layers, in lower case, that are preferred if a file has several pictures, most likely first.
 _PICTURES = ("", "rgba", "rgb", "combined", "composite", "beauty", "image", "color", "colour", "main", "c")
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One image of a file, as its header has it."""
+    """The header of one part (image) of a file."""
 
     name: str
     header: dict[str, Any]
     channels: list[str]
 
     def window(self, name: str) -> tuple[int, int, int, int]:
-        """Left, top, and one beyond right and bottom."""
+        """Return left, top, right and bottom of a window; right and bottom are exclusive."""
         if name not in self.header:
             raise InputError(f"damaged: it has no {name}")
         (left, top), (right, bottom) = self.header[name]
@@ -44,11 +44,11 @@ class _Part:
 
     @property
     def deep(self) -> bool:
-        """Whether its pixels are lists of samples at many depths."""
+        """Whether the pixels are lists of samples at several depths."""
         return str(self.header.get("type")).startswith("Storage.deep")
 
     def check(self) -> None:
-        """Raise InputError for sizes that cannot be used."""
+        """Raise InputError if a window or tile is too large or empty."""
         for name in ("displayWindow", "dataWindow"):
             left, top, right, bottom = self.window(name)
             check_size(right - left, bottom - top, MAX_SKY_SIDE)
@@ -58,19 +58,20 @@ class _Part:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all channels, at most."""
+        """Upper bound of the size of all channels in bytes."""
         left, top, right, bottom = self.window("dataWindow")
         return 4 * (right - left) * (bottom - top) * len(self.channels)
 
 
 @dataclass(frozen=True)
 class _Picture:
-    """Channels of one part that make a picture."""
+    """The channels of one part that form a picture."""
 
     part: int
     layer: str
-    """what comes before the last dot of the channels' names"""
+    """text before the last dot in the names of the channels"""
     kind: tuple[str, ...]
+    """one of _KINDS"""
 
     @property
     def channels(self) -> list[str]:
@@ -78,9 +79,9 @@ class _Picture:
 
 
 def read_exr(path: Path) -> tuple[Array, bool]:
-    """float32 (H, W, 3), linear RGB of Rec. 709, and whether it is a cube of six faces. Errors do not name the path.
+    """Read an OpenEXR file: float32 (H, W, 3), linear RGB of Rec. 709, and whether it is a cube of six faces.
 
-    H and W are those of the display window: where the data window leaves it empty, it is black.
+    The result covers the display window and is black outside the data window. Raises InputError without the path.
     """
     import OpenEXR
 
@@ -93,12 +94,12 @@ def read_exr(path: Path) -> tuple[Array, bool]:
         part.check()
     if sum(part.nbytes for part in parts) > _MOST_BYTES:
         raise InputError(f"its channels take more than {_MOST_BYTES >> 30} GiB")
-    picture = _chosen(parts)
+    picture = _choose_picture(parts)
     with _opened(path, header_only=False) as file:
         channels = file.channels(picture.part)
         planes = [np.asarray(channels[name].pixels) for name in picture.channels]
     part = parts[picture.part]
-    pixels = _placed(_colours(picture.kind, planes, part.header), part)
+    pixels = _to_display_window(_colours(picture.kind, planes, part.header), part)
     return pixels, part.header.get("envmap") == OpenEXR.ENVMAP_CUBE
 
 
@@ -117,7 +118,7 @@ def _opened(path: Path, header_only: bool) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence the OpenEXR library, which reports damage on both standard streams, also below Python."""
+    """Silence the OpenEXR library, which reports damage on standard output and error, from Python and from C++."""
     saved = {}
     for stream in (1, 2):
         with contextlib.suppress(OSError):  # there is no such stream
@@ -129,20 +130,20 @@ def _quiet() -> Iterator[None]:
         with contextlib.redirect_stdout(io.StringIO()):
             yield
     finally:
-        with contextlib.suppress(TypeError, OSError, AttributeError):  # elsewhere than on POSIX
-            ctypes.CDLL(None).fflush(None)  # what C has not written yet
+        with contextlib.suppress(TypeError, OSError, AttributeError):  # not on a POSIX system
+            ctypes.CDLL(None).fflush(None)  # write what the C library has buffered
         for stream, before in saved.items():
             os.dup2(before, stream)
             os.close(before)
         os.close(nowhere)
 
 
-def _chosen(parts: list[_Part]) -> _Picture:
-    """The one picture that is clearly meant."""
+def _choose_picture(parts: list[_Part]) -> _Picture:
+    """Choose the most likely picture of a file. Raises InputError if there is none, or several equally likely ones."""
     flat = [(i, part) for i, part in enumerate(parts) if not part.deep]
     if not flat:
-        raise InputError("deep pixels, lists of samples at many depths, are not supported")
-    found, names = [], []
+        raise InputError("deep images, with several samples per pixel, are not supported")
+    candidates, names = [], []
     for i, part in flat:
         layers: dict[str, set[str]] = {}
         for channel in part.channels:
@@ -152,28 +153,28 @@ def _chosen(parts: list[_Part]) -> _Picture:
         for layer, has in layers.items():
             kind = next((kind for kind in _KINDS if has.issuperset(kind)), None)
             if kind is not None:
-                found.append((_rank(layer, part.name), _Picture(i, layer, kind)))
-    best = min((rank for rank, _ in found), default=0)
-    likeliest = [picture for rank, picture in found if rank == best]
+                candidates.append((_rank(layer, part.name), _Picture(i, layer, kind)))
+    best = min((rank for rank, _ in candidates), default=0)
+    likeliest = [picture for rank, picture in candidates if rank == best]
     listed = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
     if not likeliest:
         raise InputError(f"no R, G and B channels (it has {listed or 'none'})")
     if len(likeliest) > 1:
-        raise InputError(f"which of its pictures is meant cannot be told (it has {listed})")
+        raise InputError(f"it is not clear which of its pictures to read (it has {listed})")
     return likeliest[0]
 
 
 def _rank(layer: str, part: str) -> int:
-    """How likely a layer is the picture, 0 the most: by its own name, or that of the part where it has none."""
+    """Rank a layer by its name, or by the name of its part if it has none. Rank 0 is the most likely picture."""
     name = (layer or part).lower().rpartition(".")[2]
     return _PICTURES.index(name) if name in _PICTURES else len(_PICTURES)
 
 
 def _colours(kind: tuple[str, ...], planes: list[Array], header: dict[str, Any]) -> Array:
-    """float32 (H, W, 3), linear RGB of Rec. 709, from the channels of a kind of picture."""
+    """Convert the channels of a kind of picture to linear RGB of Rec. 709: float32 (H, W, 3)."""
     primaries = header.get("chromaticities", REC709)
     planes = [plane.astype(np.float32) for plane in planes]
-    with np.errstate(all="ignore"):  # what is not finite is told later
+    with np.errstate(all="ignore"):  # the caller checks that pixels are finite
         if kind == ("X", "Y", "Z"):
             return transformed(np.stack(planes, axis=-1), from_xyz())
         if kind == ("Y",):
@@ -190,7 +191,7 @@ def _colours(kind: tuple[str, ...], planes: list[Array], header: dict[str, Any])
 
 
 def _enlarged(plane: Array, shape: tuple[int, ...]) -> Array:
-    """A plane that has values at even rows and columns only, with those between them interpolated."""
+    """Interpolate a chroma plane with values at even rows and columns to the full shape."""
     for axis in (0, 1):
         if plane.shape[axis] < shape[axis]:
             after = np.concatenate([plane, plane.take([-1], axis)], axis).take(range(1, plane.shape[axis] + 1), axis)
@@ -200,14 +201,14 @@ def _enlarged(plane: Array, shape: tuple[int, ...]) -> Array:
     return plane
 
 
-def _placed(pixels: Array, part: _Part) -> Array:
-    """Pixels of the data window in the display window."""
+def _to_display_window(pixels: Array, part: _Part) -> Array:
+    """Copy pixels of the data window into the display window."""
     left, top, right, bottom = part.window("dataWindow")
     l0, t0, r0, b0 = part.window("displayWindow")
     if (left, top, right, bottom) == (l0, t0, r0, b0):
         return pixels
-    placed = np.zeros((b0 - t0, r0 - l0, 3), np.float32)
+    window = np.zeros((b0 - t0, r0 - l0, 3), np.float32)
     x0, x1, y0, y1 = max(left, l0), min(right, r0), max(top, t0), min(bottom, b0)
     if x0 < x1 and y0 < y1:
-        placed[y0 - t0 : y1 - t0, x0 - l0 : x1 - l0] = pixels[y0 - top : y1 - top, x0 - left : x1 - left]
-    return placed
+        window[y0 - t0 : y1 - t0, x0 - l0 : x1 - l0] = pixels[y0 - top : y1 - top, x0 - left : x1 - left]
+    return window

@@ -1,17 +1,17 @@
-"""What every reader of images asks first: whether the image is of a size to use."""
+"""Limits of the size of images, and their check."""
 
 from __future__ import annotations
 
 from wgsss.errors import InputError
 
 MAX_SIDE = 8192
-"""texels: the longest side of a texture that every WebGPU device has"""
+"""longest side of a texture, in texels, that every WebGPU device supports"""
 MAX_SKY_SIDE = 16384
-"""pixels: the longest side of a sky, which is averaged before it becomes a texture"""
+"""longest side of a sky, in pixels; skies are averaged before they become textures"""
 
 
 def check_size(width: int, height: int, most: int = MAX_SIDE) -> None:
-    """Raise InputError for an image without pixels, or with more than `most` on a side."""
+    """Raise InputError if an image has no pixels, or more than `most` on a side."""
     if width < 1 or height < 1:
         raise InputError("the image is empty")
     if max(width, height) > most:

@@ -1,5 +1,7 @@
-"""Radiance .hdr files (Ward, "Real pixels", Graphics Gems II; "Radiance file formats"): a mantissa for each channel and
-an exponent that they share, flat or run-length encoded in an old and a new way."""
+"""Reader of Radiance .hdr files. A pixel has a mantissa for each of its three channels and one shared exponent.
+
+Sources: Ward, "Real pixels", Graphics Gems II, and "Radiance file formats".
+"""
 
 from __future__ import annotations
 
@@ -16,45 +18,46 @@ import numpy.typing as npt
 from wgsss.errors import InputError, Note
 from wgsss.scene.images.colour import EQUAL_ENERGY, from_primaries, from_xyz, transformed
 from wgsss.scene.images.files import MAX_SKY_SIDE, check_size
-from wgsss.scene.images.runs import decoded
+from wgsss.scene.images.runs import decode
 
 Array = npt.NDArray[Any]
 
-_LONGEST_HEAD = 1 << 16  # bytes
+_LONGEST_HEADER = 1 << 16  # bytes
 _WHITE_EFFICACY = 179.0  # lm/W: Radiance writes XYZ in candela per square metre
 _SIZE = re.compile(rb"([-+])([XY]) +(\d{1,9}) +([-+])([XY]) +(\d{1,9}) *")
 _POWERS = np.ldexp(1.0, np.arange(256) - 136).astype(np.float32)
-_POWERS[0] = 0.0  # black, whatever the mantissa
+_POWERS[0] = 0.0  # black for any mantissa
 
 
 @dataclass(frozen=True)
 class Header:
-    """What the head of a file says. Lines of pixels run along the second of the two `axes`."""
+    """The header of a file."""
 
     axes: tuple[str, str]
-    """"-Y", "+X" and so on, the sign being the way that the axis is gone along; Y points up, X to the right"""
+    """directions from line to line, and along a line, such as ("-Y", "+X"); +Y is up, +X is right"""
     shape: tuple[int, int]
-    """the number of lines, and of pixels in each"""
+    """number of lines, and of pixels in a line"""
     scale: Array
-    """by which the file's values are multiplied (3,)"""
+    """(3,): factors of the values of the file"""
     matrix: Array | None
-    """from the file's colours to linear Rec. 709, (3, 3); None where they are that"""
+    """(3, 3): matrix from the colours of the file to linear Rec. 709; None for the identity"""
     start: int
-    """of the pixels, bytes from the beginning of the file"""
+    """byte offset of the pixels"""
 
 
 def read_hdr(path: Path) -> tuple[Array, bool]:
-    """float32 (H, W, 3), linear RGB of Rec. 709, and False: such files are no cubes. Errors do not name the path.
+    """Read a Radiance file: float32 (H, W, 3), linear RGB of Rec. 709, and False, since it is never a cube.
 
-    EXPOSURE and COLORCORR are taken out, PRIMARIES and XYZ are converted. GAMMA is told in a warning, and not applied.
+    Values are divided by EXPOSURE and COLORCORR; PRIMARIES and XYZ are converted. GAMMA is not applied, and causes a
+    warning. Raises InputError without the path.
     """
     with path.open("rb") as file:
-        header = _header(file.read(_LONGEST_HEAD), path)
+        header = _header(file.read(_LONGEST_HEADER), path)
         lines, length = header.shape
         file.seek(header.start)
-        data = file.read(lines * (8 * length + 8))  # at most: a run of one takes two bytes
-    rgbe = decoded(data, lines, length)
-    if header.axes[0][1] == "X":  # lines are columns
+        data = file.read(lines * (8 * length + 8))  # upper bound: a run of one byte takes two bytes
+    rgbe = decode(data, lines, length)
+    if header.axes[0][1] == "X":  # lines of the file are columns of the image
         rgbe = rgbe.transpose(1, 0, 2)
     rgbe = rgbe[:: -1 if "+Y" in header.axes else 1, :: -1 if "-X" in header.axes else 1]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -64,6 +67,7 @@ def read_hdr(path: Path) -> tuple[Array, bool]:
 
 
 def _header(head: bytes, path: Path) -> Header:
+    """Parse the header at the beginning of a file. The path is for warnings."""
     damaged = InputError("damaged, or not a Radiance .hdr file")
     if not head.startswith(b"#?"):
         raise damaged
@@ -86,18 +90,20 @@ def _header(head: bytes, path: Path) -> Header:
         elif name == b"COLORCORR":
             divisors.append(_numbers(name, value, 3, above=0.0))
         elif name == b"PRIMARIES":
-            found = _numbers(name, value, 8)
-            primaries = found if found.any() else None  # some writers fill it with zeros
+            chromaticities = _numbers(name, value, 8)
+            primaries = chromaticities if chromaticities.any() else None  # some programs write zeros
         elif name == b"GAMMA" and (_numbers(name, value, 1, above=0.0) != 1.0).any():
             warnings.warn(f"{path}: GAMMA={_text(value)} is not applied", Note, stacklevel=2)
     with np.errstate(all="ignore"):
         scale = np.prod(1.0 / np.stack([np.broadcast_to(d, 3) for d in divisors]), axis=0)
     if not (np.isfinite(scale).all() and scale.all()):
-        raise InputError("EXPOSURE and COLORCORR, all multiplied, are beyond what numbers hold")
+        raise InputError("the product of EXPOSURE and COLORCORR is out of range")
     end = head.find(b"\n", at)
     size = _SIZE.fullmatch(head[at:end].rstrip(b"\r")) if end >= 0 else None
     if size is None or size[2] == size[5]:
-        raise InputError(f"damaged: its size should come next, not '{_text(head[at : end if end >= 0 else None])}'")
+        raise InputError(
+            f"damaged: expected the size of the image, not '{_text(head[at : end if end >= 0 else None])}'"
+        )
     shape = int(size[3]), int(size[6])
     check_size(*(shape[::-1] if size[2] == b"Y" else shape), MAX_SKY_SIDE)
     if xyz:
@@ -109,17 +115,18 @@ def _header(head: bytes, path: Path) -> Header:
 
 
 def _numbers(name: bytes, value: bytes, count: int, above: float = -math.inf) -> Array:
+    """Parse the numbers (count,) of a variable. Raises InputError if they are not finite or not above a bound."""
     try:
-        found = np.array([float(word) for word in value.split()])
+        numbers = np.array([float(word) for word in value.split()])
     except ValueError:
-        found = np.empty(0)
-    if len(found) != count or not np.isfinite(found).all() or found.min() <= above:
-        wanted = "a number" if count == 1 else f"{count} numbers"
-        raise InputError(f"{_text(name)}={_text(value)} is not {wanted}{' above 0' if above == 0.0 else ''}")
-    return found
+        numbers = np.empty(0)
+    if len(numbers) != count or not np.isfinite(numbers).all() or numbers.min() <= above:
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise InputError(f"{_text(name)}={_text(value)} is not {expected}{' above 0' if above == 0.0 else ''}")
+    return numbers
 
 
 def _text(value: bytes) -> str:
-    """Bytes of a file, fit for a message of one line."""
+    """Format bytes of a file for a message of one line."""
     text = value[:40].decode("ascii", "replace").strip()
     return "".join(c if c.isprintable() else "?" for c in text)

@@ -1,4 +1,4 @@
-"""Textures as the passes take them: 8 bits for each of the channels that are asked for."""
+"""Reader of textures with 8 bits per channel, the format that the passes use."""
 
 from __future__ import annotations
 
@@ -10,53 +10,54 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
-from wgsss.scene.images.pixels import named, read_pixels
+from wgsss.scene.images.pixels import message_prefix, read_pixels
 
 Array = npt.NDArray[Any]
 
-_LUMA = (19595, 38470, 7471)  # ITU-R BT.601, in units of 2^-16: what Pillow makes grey by
+_LUMA = (19595, 38470, 7471)  # weights of ITU-R BT.601, in units of 2^-16, as in Pillow
 
 
 def read_map(source: str | Path | bytes, mode: str, *, linear: bool = False) -> npt.NDArray[np.uint8]:
-    """A texture in 8 bits, from an image file of any depth or the encoded bytes of one.
+    """Read a texture with 8 bits per channel from an image file of any bit depth, or from its encoded bytes.
+
+    Values outside 0 to 1 are clamped, with a warning.
 
     Args:
-        mode: "RGB" for (H, W, 3), "RGBA" for (H, W, 4), "L" for (H, W), the grey or the luminance of colours, "A" for
-            (H, W), alpha, which is 255 where the image has none.
-        linear: whether the map holds data (normals, thickness, a factor), not colours. It matters for images of
-            floating point, which hold linear colours: those of colour maps are encoded as sRGB, those of data kept.
+        mode: "RGB" for (H, W, 3); "RGBA" for (H, W, 4); "L" for grey or luminance, (H, W); "A" for alpha, (H, W), which
+            is 255 if the image has none.
+        linear: whether the map holds data (normals, thickness, a factor) instead of colours. Floating-point images hold
+            linear values: colours are encoded as sRGB, and data are kept.
 
     Raises:
-        InputError: as `read_pixels`, and for numbers that are not finite. Values outside 0 to 1 are clamped, with a
-            warning.
+        InputError: as `read_pixels`, and for numbers that are not finite.
     """
     pixels = read_pixels(source)
     if pixels.dtype == np.float32:
-        pixels = _finite(pixels, named(source))
+        pixels = _finite(pixels, message_prefix(source))
         if not linear:
             colours = pixels.shape[2] - (pixels.shape[2] in (2, 4))
             pixels[..., :colours] = _srgb(pixels[..., :colours])
     return _eight_bits(_channels(pixels, mode))
 
 
-def _finite(pixels: Array, where: str) -> Array:
-    """Clamped to 0 to 1, with a warning where this changes something."""
+def _finite(pixels: Array, prefix: str) -> Array:
+    """Check that pixels are finite, and clamp them to 0 to 1, with a warning if this changes them."""
     bad = int((~np.isfinite(pixels)).any(axis=2).sum())
     if bad:
-        raise InputError(f"{where}{bad} pixels are not finite numbers")
+        raise InputError(f"{prefix}{bad} pixels are not finite numbers")
     outside = int(((pixels < 0.0) | (pixels > 1.0)).any(axis=2).sum())
     if outside:
-        warnings.warn(f"{where}{outside} pixels outside 0 to 1 are clamped", Note, stacklevel=3)
+        warnings.warn(f"{prefix}{outside} pixels outside 0 to 1 are clamped", Note, stacklevel=3)
     return np.clip(pixels, 0.0, 1.0)
 
 
 def _srgb(linear: Array) -> Array:
-    """IEC 61966-2-1."""
+    """Encode linear values 0 to 1 as sRGB (IEC 61966-2-1)."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
 
 
 def _channels(pixels: Array, mode: str) -> Array:
-    """The channels of a mode, at the depth of the image."""
+    """Return the channels of a mode, at the bit depth of the image."""
     channels = pixels.shape[2]
     colours = pixels[..., :1] if channels < 3 else pixels[..., :3]
     full = 1.0 if pixels.dtype == np.float32 else np.iinfo(pixels.dtype).max
@@ -74,6 +75,7 @@ def _channels(pixels: Array, mode: str) -> Array:
 
 
 def _luma(colours: Array) -> Array:
+    """Compute grey (H, W) from one or three channels, at the bit depth of the image."""
     if colours.shape[2] == 1:
         return colours[..., 0]
     if colours.dtype == np.float32:
@@ -86,7 +88,7 @@ def _luma(colours: Array) -> Array:
 
 
 def _eight_bits(pixels: Array) -> npt.NDArray[np.uint8]:
-    """Rounded to 8 bits, in memory of its own."""
+    """Round to 8 bits. The result is a new array."""
     if pixels.dtype == np.uint16:
         pixels = (pixels.astype(np.uint32) + 128) // 257
     elif pixels.dtype == np.float32:

@@ -1,8 +1,7 @@
-"""Textures from image files at the depth that the file has: PNG, JPEG, TIFF, WebP and others that Pillow reads.
+"""Reader of image files at their full bit depth: PNG, JPEG, TIFF, WebP and others that Pillow reads.
 
-Pillow reduces some 16-bit kinds to 8 bits and does not know some others. Those are read in another way: PNG of 16 bits
-and several channels by decoding twice, TIFF of more than 8 bits by tifffile through imageio. For the other formats
-imageio would hand on what Pillow gives, less the transparency of palettes.
+Pillow reduces some 16-bit images to 8 bits and cannot read others. Therefore, PNG files of 16 bits and several channels
+are decoded twice, and TIFF files of more than 8 bits are read by tifffile through imageio.
 """
 
 from __future__ import annotations
@@ -24,28 +23,28 @@ from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
-# Pillow has readers that start other programs (EPS) and such that take almost any file for theirs (TGA).
+# Some readers of Pillow start other programs (EPS) or accept almost any file (TGA).
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "GIF", "PPM", "JPEG2000", "DDS", "PSD", "WEBP")
 _TGA = (".tga", ".icb", ".vda", ".vst")
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-# Pillow's names of how the bytes of a PNG are packed: those of 16 bits that it reduces; the mode, and the name by which
-# it takes the second bytes.
+# Pillow's names of the 16-bit layouts of PNG files that it reduces to 8 bits, with the mode and the name of the layout
+# that decode the low bytes.
 _LOW_BYTES = {"RGB;16B": ("RGB", "RGB;16L"), "RGBA;16B": ("RGBA", "RGBA;16L"), "LA;16B": ("RGBA", "RGBA")}
 _PLAIN = {"1": "L", "La": "LA", "PA": "RGBA", "RGBa": "RGBA", **{m: m for m in ("L", "LA", "RGB", "RGBA", "I", "F")}}
 _RADIANCE = (b"#?", b"\x76\x2f\x31\x01")
 
 
 def read_pixels(source: str | Path | bytes) -> Array:
-    """The first image of a file, or of the encoded bytes of one, (H, W, C) at the depth that it has.
+    """Read the first image of a file, or of its encoded bytes, at its bit depth.
 
     Returns:
-        uint8 or uint16, where the largest value of the type stands for 1, or float32. C is 1 for grey, 2 for grey and
-        alpha, 3 for RGB, 4 for RGB and alpha; alpha is not multiplied in. EXIF orientation, colour profiles and gamma
-        are ignored, as glTF 2.0 wants it.
+        (H, W, C) of type uint8 or uint16, where the largest value of the type means 1, or float32. C is 1 for grey, 2
+        for grey and alpha, 3 for RGB, 4 for RGB and alpha; colours are not multiplied by alpha. EXIF orientation,
+        colour profiles and gamma are ignored, as glTF 2.0 requires.
 
     Raises:
-        InputError: for a file that is missing, damaged, not an image, or larger than MAX_SIDE on a side, which is told
-            from its header.
+        InputError: if the file is missing, damaged or not an image, or has more than MAX_SIDE pixels on a side, which
+            is checked before decoding.
     """
     if not isinstance(source, bytes):
         require_file(Path(source))
@@ -53,34 +52,34 @@ def read_pixels(source: str | Path | bytes) -> Array:
         data = source if isinstance(source, bytes) else Path(source).read_bytes()
         pixels = _decoded(data, tga=not isinstance(source, bytes) and Path(source).suffix.lower() in _TGA)
     except InputError as error:
-        raise InputError(f"{named(source)}{error}") from None
+        raise InputError(f"{message_prefix(source)}{error}") from None
     except OSError as error:
-        raise InputError(f"{named(source)}cannot be read ({error.strerror or error})") from None
-    return _unit_range(pixels, named(source))
+        raise InputError(f"{message_prefix(source)}cannot be read ({error.strerror or error})") from None
+    return _unit_range(pixels, message_prefix(source))
 
 
-def named(source: str | Path | bytes) -> str:
-    """The head of a message about a source: its path, or nothing for bytes, which their owner names."""
+def message_prefix(source: str | Path | bytes) -> str:
+    """Return the beginning of messages about a source: its path, or "" for bytes, which the caller names."""
     return "" if isinstance(source, bytes) else f"{source}: "
 
 
 def _decoded(data: bytes, tga: bool) -> Array:
     if data.startswith(_RADIANCE):
-        raise InputError("a .hdr or .exr image can light a scene, but not be a texture: convert it to PNG or TIFF")
+        raise InputError("a .hdr or .exr image can light a scene, but cannot be a texture: convert it to PNG or TIFF")
     with _quiet():
         try:
             pixels = _read_tiff(data) if data.startswith(_TIFF) else None
             pixels = _read_with_pillow(data, tga) if pixels is None else pixels
         except InputError:
             raise
-        except Exception:  # decoders raise whatever their damaged data makes them stumble over
+        except Exception:  # decoders raise any exception for damaged data
             raise InputError("damaged, or not an image") from None
     return pixels
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without the libraries' own remarks, and without Pillow's limit of size: ours is lower, and tells the size."""
+    """Suppress messages of the libraries and the size limit of Pillow. `check_size` has a lower limit."""
     from PIL import Image
 
     log = logging.getLogger("tifffile")
@@ -99,7 +98,7 @@ def _read_with_pillow(data: bytes, tga: bool) -> Array:
         raw = image.tile[0].args if image.format == "PNG" and image.tile else ""
         if isinstance(raw, str) and raw in _LOW_BYTES:
             return _read_png_16(data, image, raw)
-        key = image.info.get("transparency")  # of a PNG: the value that is transparent
+        key = image.info.get("transparency")  # the transparent value of a PNG
         if image.mode.startswith("I;16"):
             grey = np.array(image).astype(np.uint16)
             return grey if key is None else np.dstack([grey, _opaque(grey != key)])
@@ -110,7 +109,7 @@ def _read_with_pillow(data: bytes, tga: bool) -> Array:
 
 
 def _opened(data: bytes, tga: bool) -> Any:
-    """A Pillow image of a size that can be used, not decoded yet."""
+    """Open a Pillow image and check its size, without decoding it."""
     from PIL import Image
 
     image = Image.open(io.BytesIO(data), formats=("TGA", *_FORMATS) if tga else _FORMATS)
@@ -119,25 +118,26 @@ def _opened(data: bytes, tga: bool) -> Any:
 
 
 def _read_png_16(data: bytes, image: Any, raw: str) -> Array:
-    """A PNG of 16 bits and several channels. Pillow keeps the first byte of each number, or as well the second one."""
+    """Read a PNG of 16 bits and several channels: first the high bytes with Pillow, then the low bytes."""
     mode, low = _LOW_BYTES[raw]
     with _opened(data, tga=False) as again:
         again._mode = mode
         again.tile = [(*again.tile[0][:3], low)]
-        second = np.array(again).astype(np.uint16)
-    if mode == "RGBA" and raw == "LA;16B":  # all four bytes of grey and alpha
-        return second[..., 0::2] << 8 | second[..., 1::2]
-    whole = np.array(image).astype(np.uint16) << 8 | second
-    key = image.info.get("transparency")  # the colour that is transparent
+        low_bytes = np.array(again).astype(np.uint16)
+    if mode == "RGBA" and raw == "LA;16B":  # the four bytes of grey and alpha
+        return low_bytes[..., 0::2] << 8 | low_bytes[..., 1::2]
+    whole = np.array(image).astype(np.uint16) << 8 | low_bytes
+    key = image.info.get("transparency")  # the transparent colour
     return whole if key is None else np.dstack([whole, _opaque((whole != np.array(key)).any(axis=2))])
 
 
-def _opaque(where: Array) -> Array:
-    return np.where(where, 65535, 0).astype(np.uint16)
+def _opaque(mask: Array) -> Array:
+    """Return 16-bit alpha: opaque where the mask is set, else transparent."""
+    return np.where(mask, 65535, 0).astype(np.uint16)
 
 
 def _read_tiff(data: bytes) -> Array | None:
-    """A TIFF of more than 8 bits; None for others, and for compression that tifffile leaves to other libraries."""
+    """Read a TIFF of more than 8 bits. Return None for others, and if tifffile cannot decode it alone."""
     import imageio.v3 as iio
 
     try:
@@ -165,8 +165,8 @@ def _read_tiff(data: bytes) -> Array | None:
     return pixels.reshape(*pixels.shape[:2], -1)[..., : colours + has_alpha]
 
 
-def _unit_range(pixels: Array, where: str) -> Array:
-    """uint8, uint16 or float32 (H, W, C) from numbers of any type; integers with a sign have no use for it."""
+def _unit_range(pixels: Array, prefix: str) -> Array:
+    """Convert pixels of any type to uint8, uint16 or float32 (H, W, C). Negative integers become 0, with a warning."""
     pixels = pixels if pixels.ndim == 3 else pixels[..., None]
     if pixels.dtype in (np.uint8, np.uint16):
         return pixels
@@ -175,8 +175,8 @@ def _unit_range(pixels: Array, where: str) -> Array:
     if pixels.dtype.kind == "b":
         return pixels.astype(np.uint8) * 255
     if pixels.min() < 0:
-        warnings.warn(f"{where}values below 0 in an image of signed integers count as 0", Note, stacklevel=2)
-    if pixels.dtype.itemsize == 4 and pixels.max() <= 65535:  # how 16 bits are kept by those who have no such type
+        warnings.warn(f"{prefix}values below 0 in an image of signed integers become 0", Note, stacklevel=2)
+    if pixels.dtype.itemsize == 4 and pixels.max() <= 65535:  # 16-bit values that are stored as 32 bits
         return np.clip(pixels, 0, 65535).astype(np.uint16)
     largest = np.iinfo(pixels.dtype).max
     return (np.maximum(pixels, 0) * (65535.0 / largest) + 0.5).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""Radiance from .hdr and .exr files, and skies: radiance over all directions."""
+"""Readers of radiance from .hdr and .exr files, and of skies, which are radiance over all directions."""
 
 from __future__ import annotations
 
@@ -16,24 +16,23 @@ from wgsss.userfiles import require_file
 
 Array = npt.NDArray[Any]
 
-_TOLERANCE = 0.02  # of the height: some writers lose or add a few rows or columns
+_TOLERANCE = 0.02  # share of the height: some programs lose or add a few rows or columns
 
 
 def read_radiance(path: str | Path) -> npt.NDArray[np.float32]:
-    """float32 (H, W, 3), linear RGB of Rec. 709 and not negative, from a Radiance .hdr or an OpenEXR .exr file.
+    """Read a Radiance .hdr or OpenEXR .exr file: float32 (H, W, 3), linear RGB of Rec. 709, not negative.
 
-    Raises InputError for a file that is missing, damaged, of another kind or too large, or holds a number that is not
-    finite.
+    Raises InputError if the file is missing, damaged, too large or of another format, or if it contains a number that
+    is not finite.
     """
     return _read(Path(path))[0]
 
 
 def read_sky(path: str | Path) -> npt.NDArray[np.float32]:
-    """Radiance over latitude and longitude, as `read_radiance` gives it: of twice the width that it has in height, or a
-    single pixel.
+    """Read a sky: radiance over latitude and longitude, twice as wide as high, or a single pixel.
 
-    An OpenEXR file whose attribute `envmap` says that it is a cube is converted. Raises InputError for an image of
-    another shape, too.
+    An OpenEXR file with the attribute `envmap` for a cube is converted. Raises InputError as `read_radiance`, and if
+    the image has another shape.
     """
     path = Path(path)
     pixels, cube = _read(path)
@@ -42,22 +41,22 @@ def read_sky(path: str | Path) -> npt.NDArray[np.float32]:
     height, width = pixels.shape[:2]
     if (height, width) != (1, 1) and abs(width - 2 * height) > max(1, 2 * _TOLERANCE * height):
         raise InputError(
-            f"{path}: {width} x {height} pixels are no sky: it is a latitude-longitude image, twice as wide as high,"
-            " or an OpenEXR cube with the attribute envmap"
+            f"{path}: {width} x {height} pixels are not a sky: it must be a latitude-longitude image, twice as wide as"
+            " high, or an OpenEXR cube with the attribute envmap"
         )
     return pixels
 
 
 def _read(path: Path) -> tuple[npt.NDArray[np.float32], bool]:
-    """Radiance, and whether the image is a cube of six faces."""
+    """Read radiance (H, W, 3), and whether the image is a cube of six faces."""
     if path.suffix.lower() not in (".hdr", ".exr"):
         raise InputError(f"{path}: an environment image must be a .hdr or .exr file")
     require_file(path)
     try:
         with path.open("rb") as file:
-            begins = file.read(4)
-        named = read_exr if path.suffix.lower() == ".exr" else read_hdr
-        reader = read_hdr if begins[:2] == b"#?" else read_exr if begins == b"\x76\x2f\x31\x01" else named
+            magic = file.read(4)
+        by_extension = read_exr if path.suffix.lower() == ".exr" else read_hdr
+        reader = read_hdr if magic[:2] == b"#?" else read_exr if magic == b"\x76\x2f\x31\x01" else by_extension
         pixels, cube = reader(path)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -68,5 +67,5 @@ def _read(path: Path) -> tuple[npt.NDArray[np.float32], bool]:
     bad = int((~np.isfinite(pixels)).any(axis=2).sum())
     if bad:
         raise InputError(f"{path}: {bad} pixels are not finite numbers")
-    # Resampling filters with negative lobes, and colours that Rec. 709 does not have, leave negative radiance.
+    # Radiance can be negative after resampling with negative lobes, and for colours outside Rec. 709.
     return np.maximum(pixels, 0.0, dtype=np.float32), cube

@@ -1,4 +1,4 @@
-"""The pixels of Radiance .hdr files: RGBE bytes, flat or in one of two run-length encodings."""
+"""Decoder of the pixels of Radiance .hdr files: RGBE bytes, flat or in one of two run-length encodings."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from wgsss.errors import InputError
 Array = npt.NDArray[Any]
 
 
-def decoded(data: bytes, lines: int, length: int) -> Array:
-    """uint8 (lines, length, 4) from all that follows the header. Raises InputError where it is damaged.
+def decode(data: bytes, lines: int, length: int) -> Array:
+    """Decode the data after the header: uint8 (lines, length, 4). Raises InputError if they are damaged.
 
-    Lines in the new encoding begin with 2, 2 and their length, which a flat line may do, too: what cannot be decoded in
-    the new way, and in the old way has exactly the size that it should have, is taken to be that.
+    Lines in the new encoding begin with 2, 2 and their length. A flat line may begin with the same bytes. Data that
+    cannot be decoded in the new encoding are therefore decoded in the old one, if they have exactly the right size.
     """
     if not (8 <= length < 32768 and data[:2] == b"\2\2" and data[2:3] < b"\x80"):
         return _old(data, lines, length, exactly=False)
@@ -31,7 +31,7 @@ def decoded(data: bytes, lines: int, length: int) -> Array:
 
 
 def _new(data: bytes, lines: int, length: int) -> Array:
-    """Each line: a marker, then its four channels, each as runs (128 + n, value) and literals (n, n values)."""
+    """Decode the new encoding: a line has a marker, then channels of runs (128 + n, value) and literals (n, values)."""
     marker = b"\2\2" + length.to_bytes(2, "big")
     planes = np.empty((lines, 4, length), np.uint8)
     at = 0
@@ -58,14 +58,17 @@ def _new(data: bytes, lines: int, length: int) -> Array:
 
 
 def _old(data: bytes, lines: int, length: int, exactly: bool) -> Array:
-    """Flat pixels, among them runs: 1, 1, 1, n repeats the pixel before n times; of runs that follow each other, n of
-    each next one counts 256 times as much. Not `exactly`, bytes may follow."""
+    """Decode the old encoding: flat pixels and runs. A run 1, 1, 1, n repeats the pixel before it n times.
+
+    In a sequence of runs, the count of each further run has 256 times the weight of the one before. Unless `exactly` is
+    set, more bytes may follow the pixels.
+    """
     total = lines * length
     pixels = np.frombuffer(data, np.uint8, len(data) // 4 * 4).reshape(-1, 4)
     run = (pixels[:, :3] == 1).all(axis=1)
     if not run[:total].any():
         counts = None
-        wanted = len(pixels) == total if exactly else len(pixels) >= total
+        valid = len(pixels) == total if exactly else len(pixels) >= total
     else:
         index = np.arange(len(pixels))
         before = np.maximum.accumulate(np.where(run, -1, index))  # the pixel that a run repeats
@@ -73,10 +76,10 @@ def _old(data: bytes, lines: int, length: int, exactly: bool) -> Array:
         counts = np.where(run, pixels[:, 3].astype(np.int64) << (8 * digit), 1)
         ends = np.minimum(counts, total + 1).cumsum()
         last = int(np.searchsorted(ends, total))
-        wanted = not run[0] and last < len(pixels) and ends[last] == total and (not exactly or last == len(pixels) - 1)
+        valid = not run[0] and last < len(pixels) and ends[last] == total and (not exactly or last == len(pixels) - 1)
         pixels, counts = pixels[before[: last + 1]], counts[: last + 1]
-    if not wanted or (exactly and len(data) % 4):
-        raise InputError(f"damaged or truncated: there are not the {total} pixels that its header tells of")
+    if not valid or (exactly and len(data) % 4):
+        raise InputError(f"damaged or truncated: it does not contain the {total} pixels of its header")
     if counts is None:
         return pixels[:total].reshape(lines, length, 4)
     return np.repeat(pixels, counts, axis=0).reshape(lines, length, 4)

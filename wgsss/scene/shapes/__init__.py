@@ -1,6 +1,6 @@
-"""Closed meshes made by code at any tessellation, in millimetres, y up; each takes about how many vertices it gets.
+"""Functions that build closed meshes with about a given number of vertices, in millimetres, y up.
 
-Parametric shapes take milliseconds; the implicit ones (gyroid, milk, statue, head) import scikit-image when called.
+Parametric shapes take milliseconds. The implicit ones (gyroid, milk, statue, head) import scikit-image when called.
 """
 
 from __future__ import annotations

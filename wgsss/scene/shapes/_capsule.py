@@ -1,4 +1,4 @@
-"""A capsule that stands upright."""
+"""An upright capsule."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from wgsss.scene.shapes._rows import fit_spacing, join_rows, spread, vertex_coun
 
 
 def capsule(length: float = 60.0, radius: float = 9.0, vertices: int | None = None) -> Mesh:
-    """A cylinder with half-spherical ends along y from 0 to `length` mm, of rings of near-equilateral triangles.
+    """Build a cylinder with hemispherical ends along y from 0 to `length` mm, in rings of near-equilateral triangles.
 
     Vertices: 50 to 1000000, by default 4000. Raises InputError for another count.
     """
-    wanted = vertex_count("capsule", vertices, 4000, 50, 1_000_000)
+    target = vertex_count("capsule", vertices, 4000, 50, 1_000_000)
     profile_length = np.pi * radius + length - 2 * radius
 
     def rings(spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Radius, height and points of each ring, from the top pole down."""
+        """Return radius, height and number of points of each ring, from the top pole down."""
         s = np.linspace(0, profile_length, max(round(profile_length / (spacing * 0.866)), 3) + 1)
         cap = np.pi / 2 * radius
         side = profile_length - cap
@@ -29,10 +29,10 @@ def capsule(length: float = 60.0, radius: float = 9.0, vertices: int | None = No
         r[[0, -1]] = 0
         return r, height + radius * np.cos(polar), counts
 
-    r, y, counts = rings(fit_spacing(lambda h: int(rings(h)[2].sum()), wanted))
+    r, y, counts = rings(fit_spacing(lambda h: int(rings(h)[2].sum()), target))
     row = np.repeat(np.arange(len(counts)), counts)
     params = spread(counts, closed=True)
-    # Every other ring is turned by half a gap, so that the triangles lean both ways.
+    # Every second ring is rotated by half a gap, so that the triangles are near-equilateral.
     angle = 2 * np.pi * (params + 0.5 * (row % 2) / counts[row])
     positions = np.stack([r[row] * np.cos(angle), y[row], r[row] * np.sin(angle)], axis=1)
     faces = join_rows(counts, angle / (2 * np.pi), closed=True)

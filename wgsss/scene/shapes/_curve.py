@@ -1,4 +1,4 @@
-"""Smooth curves through a few points."""
+"""Smooth curves through given points."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 
 def smooth_curve(points: np.ndarray, samples: int, *, closed: bool = False) -> np.ndarray:
-    """(samples, D) points along the Catmull-Rom curve through `points` (N,D), even in its parameter.
+    """Sample the Catmull-Rom curve through `points` (N,D) at equal steps of its parameter: (samples, D).
 
-    A closed curve starts at the first point and does not repeat it; an open one includes both ends.
+    A closed curve starts at the first point and does not repeat it. An open curve includes both ends.
     """
     points = np.asarray(points, dtype=float)
     n = len(points)

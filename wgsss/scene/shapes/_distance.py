@@ -1,4 +1,4 @@
-"""Signed distances, mm, to simple solids: negative inside. Points come as three arrays of one shape, x, y and z."""
+"""Signed distances to simple solids, in mm, negative inside. Points are three arrays of the same shape: x, y and z."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Point = tuple[float, float, float]
 
 
 def ball(x: np.ndarray, y: np.ndarray, z: np.ndarray, centre: Point, radius: float) -> np.ndarray:
-    """A sphere."""
+    """Return the distance to a sphere."""
     return np.sqrt((x - centre[0]) ** 2 + (y - centre[1]) ** 2 + (z - centre[2]) ** 2) - radius
 
 
 def ellipsoid(x: np.ndarray, y: np.ndarray, z: np.ndarray, centre: Point, radii: Point) -> np.ndarray:
-    """An ellipsoid along the axes; exact to first order near its surface (k0 (k0 - 1) / k1, after I. Quilez)."""
+    """Estimate the distance to an axis-aligned ellipsoid, exact to first order at its surface (after I. Quilez)."""
     u, v, w = (x - centre[0]) / radii[0], (y - centre[1]) / radii[1], (z - centre[2]) / radii[2]
     k0 = np.sqrt(u * u + v * v + w * w)
     k1 = np.sqrt((u / radii[0]) ** 2 + (v / radii[1]) ** 2 + (w / radii[2]) ** 2)
@@ -24,7 +24,7 @@ def ellipsoid(x: np.ndarray, y: np.ndarray, z: np.ndarray, centre: Point, radii:
 
 
 def limb(x: np.ndarray, y: np.ndarray, z: np.ndarray, a: Point, b: Point, ra: float, rb: float) -> np.ndarray:
-    """A rod from a to b with round ends whose radius goes evenly from ra to rb."""
+    """Return the distance to a rod from a to b with round ends, whose radius changes linearly from ra to rb."""
     run = np.subtract(b, a)
     along = ((x - a[0]) * run[0] + (y - a[1]) * run[1] + (z - a[2]) * run[2]) / (run @ run)
     along = np.clip(along, 0, 1)
@@ -33,11 +33,11 @@ def limb(x: np.ndarray, y: np.ndarray, z: np.ndarray, a: Point, b: Point, ra: fl
 
 
 def join(a: np.ndarray, b: np.ndarray, blend: float) -> np.ndarray:
-    """The union, its crease filled over a width `blend` (polynomial smooth minimum)."""
+    """Unite two solids, and smooth the crease over a width `blend` (polynomial smooth minimum)."""
     h = np.maximum(blend - np.abs(a - b), 0)
     return np.minimum(a, b) - h * h * (0.25 / blend)
 
 
 def carve(a: np.ndarray, b: np.ndarray, blend: float) -> np.ndarray:
-    """What is left of a when b is taken away, its edge rounded over a width `blend`."""
+    """Subtract solid b from solid a, and round the edge over a width `blend`."""
     return -join(-a, b, blend)

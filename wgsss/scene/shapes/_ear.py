@@ -12,8 +12,8 @@ from wgsss.scene.shapes._rows import fit_spacing, join_rows, spread, vertex_coun
 _SHELL = 2.0  # mm, thickness of the shell along its normal
 _CENTRE = np.array([0.0, 1.0])
 
-# Seen from the side of the head: x towards the nose is negative, y up; mm. With each point of the outline comes the
-# radius of the rim there: the helix is thick at the top, the lobe soft, the edge on the cheek as thin as the shell.
+# Points of the outline, x and y, and the radius of the rim at each, mm. Seen from the side of the head: the nose is at
+# negative x, y is up. The helix is thick at the top, and the edge at the cheek is as thin as the shell.
 _OUTLINE = np.array(
     [
         (1.0, 30.0, 3.1), (9.5, 27.6, 3.0), (15.3, 21.0, 2.8), (17.6, 11.5, 2.6), (16.8, 1.0, 2.4),
@@ -23,7 +23,7 @@ _OUTLINE = np.array(
     ]
 )  # fmt: skip
 
-# Ridges: the points of a curve, its height at each (mm, towards the viewer) and its half width (mm).
+# Ridges: the points of a curve, its height at each point (mm, towards the viewer) and its half width (mm).
 _Ridge = tuple[tuple[tuple[float, float], ...], tuple[float, ...], float]
 _ANTIHELIX: _Ridge = (
     ((0.5, -15.0), (5.0, -11.5), (8.2, -4.0), (8.4, 4.0), (6.0, 11.5), (2.5, 17.5), (0.0, 22.0)),
@@ -36,19 +36,19 @@ _TRAGUS = (((-9.4, -2.5), (-7.6, -6.5), (-7.6, -10.5)), (3.0, 7.0, 3.0), 1.9)
 _ANTITRAGUS = (((2.0, -14.8), (-2.5, -16.0)), (2.0, 3.4), 2.0)
 _LOBE = (((-3.5, -22.5), (2.0, -22.5)), (2.2, 2.2), 3.6)
 
-# The bowl in front of the canal and the canal: centre, depth and half width of each hollow, mm.
+# Hollows (the bowl in front of the ear canal, and the canal): x and y of the centre, depth and half width, mm.
 _HOLLOWS = ((2.0, 5.0, 5.6, 4.4), (2.6, -2.0, 5.6, 4.4), (-0.8, -8.0, 5.2, 4.2), (-4.2, -5.5, 4.0, 2.8))
 _FOLDS = (_ANTIHELIX, _LOWER_CRUS)
 _FRONT_ONLY = (_HELIX_CRUS, _TRAGUS, _ANTITRAGUS, _LOBE)
 
 
 def ear(vertices: int | None = None) -> Mesh:
-    """A left ear facing +z, its back edge at +x: 60 mm tall, a 2 mm shell with a rim up to 6 mm thick.
+    """Build a left ear facing +z, with its back edge at +x: 60 mm tall, a shell of 2 mm with a rim of up to 6 mm.
 
-    One closed surface: from the middle of the front outwards, over the rolled rim and back to the middle of the back.
-    Vertices: 500 to 500000, by default 6000. Raises InputError for another count.
+    The surface is closed. Its rings go from the centre of the front outwards, over the rolled rim, and to the centre of
+    the back. Vertices: 500 to 500000, by default 6000. Raises InputError for another count.
     """
-    wanted = vertex_count("ear", vertices, 6000, 500, 500_000)
+    target = vertex_count("ear", vertices, 6000, 500, 500_000)
     outline = smooth_curve(_OUTLINE, 512, closed=True)
     rim, radius = outline[:, :2], outline[:, 2]
     tangent = np.roll(rim, -1, axis=0) - np.roll(rim, 1, axis=0)
@@ -57,25 +57,26 @@ def ear(vertices: int | None = None) -> Mesh:
     reach = perimeter / (2 * np.pi)
 
     def rings(spacing: float) -> tuple[int, int, np.ndarray]:
-        """Rings on either sheet, rings over the rim, and the points of each ring, from front to back."""
+        """Return the numbers of rings on each sheet and over the rim, and the number of points of each ring."""
         apart = spacing * 0.866
         sheet, bead = max(round(reach / apart), 3), max(round(1.2 * np.pi * radius.mean() / apart), 3)
         share = np.concatenate([np.arange(1, sheet + 1) / sheet, np.ones(bead - 1), np.arange(sheet, 0, -1) / sheet])
         counts = np.maximum(np.round(share * perimeter / spacing), 5).astype(int)
         return sheet, bead, np.concatenate([[1], counts, [1]])
 
-    sheet, bead, counts = rings(fit_spacing(lambda h: int(rings(h)[2].sum()), wanted))
+    sheet, bead, counts = rings(fit_spacing(lambda h: int(rings(h)[2].sum()), target))
     row = np.repeat(np.arange(len(counts)), counts)
     params = spread(counts, closed=True) + 0.5 * (row % 2) / counts[row]
 
     def around(values: np.ndarray) -> np.ndarray:
-        """Values given along the outline, at the points of all rings."""
+        """Interpolate values (N, K) along the outline at the points of all rings."""
         at = np.linspace(0, 1, len(values) + 1)
         wrapped = np.concatenate([values, values[:1]])
         return np.stack([np.interp(params, at, wrapped[:, k]) for k in range(values.shape[1])], axis=1)
 
-    # The rim is a circle that rests on the back sheet and leaves the front sheet at an angle about its own centre: 0
-    # inwards, 90 degrees towards the viewer. Where the sheet is thicker than the circle (the tragus), the circle grows.
+    # In cross-section, the rim is a circle. It touches the back sheet, and meets the front sheet at the angle `start`
+    # about the centre of the circle: 0 is inwards, 90 degrees is towards the viewer. Where the shell is thicker than
+    # the circle (the tragus), the circle is enlarged.
     start = np.arcsin(np.clip(_SHELL / radius - 1, -1, 1))
     for _ in range(2):
         front_edge = rim + inward * (radius * (1 + np.cos(start)))[:, None]
@@ -107,14 +108,14 @@ def ear(vertices: int | None = None) -> Mesh:
 
 
 def _smooth_around(values: np.ndarray) -> np.ndarray:
-    """Values (N,) given along the outline, averaged over about a fifteenth of it."""
+    """Smooth values (N,) along the outline over about a fifteenth of its length."""
     width = len(values) // 30
     window = np.hanning(2 * width + 3)[1:-1]
     return np.convolve(np.pad(values, width, mode="wrap"), window / window.sum(), mode="valid")
 
 
 def _ridges(q: np.ndarray, features: tuple[_Ridge, ...], *, soften: float) -> np.ndarray:
-    """Height (N,), mm, of ridges at points (N,2); `soften` widens and lowers them."""
+    """Compute the height (N,), mm, of ridges at points (N,2). `soften` widens and lowers them."""
     total = np.zeros(len(q))
     for points, heights, width in features:
         curve = smooth_curve(np.column_stack([points, heights]), 2 * len(points) - 1)
@@ -129,7 +130,7 @@ def _ridges(q: np.ndarray, features: tuple[_Ridge, ...], *, soften: float) -> np
 
 
 def _cup(q: np.ndarray) -> np.ndarray:
-    """The sheet without its folds: a bowl, whose back edge and top stand off towards the viewer."""
+    """Compute the height of the sheet without folds at points (N,2): a bowl with raised back edge and top."""
     height = 0.010 * (q[:, 0] + 6) ** 2 + 0.003 * q[:, 1] ** 2 + 0.05 * q[:, 1]
     for x, y, depth, width in _HOLLOWS:
         height -= depth * np.exp(((q[:, 0] - x) ** 2 + (q[:, 1] - y) ** 2) * (-0.5 / width**2))
@@ -137,11 +138,12 @@ def _cup(q: np.ndarray) -> np.ndarray:
 
 
 def _front(q: np.ndarray) -> np.ndarray:
+    """Compute the height (N,), mm, of the front sheet at points (N,2)."""
     return _cup(q) + _ridges(q, _FOLDS + _FRONT_ONLY, soften=1.0)
 
 
 def _back(q: np.ndarray) -> np.ndarray:
-    """The back sheet: the cup and softer folds, a shell's thickness behind along the normal."""
+    """Compute the height (N,), mm, of the back sheet: the cup with softer folds, one shell thickness behind it."""
 
     def sheet(q: np.ndarray) -> np.ndarray:
         return _cup(q) + _ridges(q, _FOLDS, soften=1.5)

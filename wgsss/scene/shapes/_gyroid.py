@@ -1,4 +1,4 @@
-"""A gyroid shell cut out by a ball."""
+"""A gyroid shell inside a ball."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from wgsss.scene.shapes._rows import vertex_count
 _RADIUS = 25.0  # mm
 _PERIOD = 25.0  # mm
 _WALL = 1.8  # mm
-_AREA = 16_300.0  # mm^2, of both sides
+_AREA = 16_300.0  # mm^2, both sides
 
 
 def gyroid(vertices: int | None = None) -> Mesh:
-    """A gyroid sheet of period 25 mm and 1.8 mm thick within a ball of 50 mm, with a rounded rim; closed, one piece.
+    """Build a gyroid sheet of period 25 mm, 1.8 mm thick, in a ball of 50 mm, with a rounded rim; closed, one piece.
 
     Vertices: 2000 to 500000, by default 12000. Raises InputError for another count.
     """
-    wanted = vertex_count("gyroid", vertices, 12_000, 2000, 500_000)
-    spacing = spacing_for(wanted, _AREA)
+    target = vertex_count("gyroid", vertices, 12_000, 2000, 500_000)
+    spacing = spacing_for(target, _AREA)
     positions, faces = _sheet(spacing)
     positions, faces = _cut(positions, faces, spacing)
     faces = _largest_piece(faces)
@@ -34,7 +34,7 @@ def gyroid(vertices: int | None = None) -> Mesh:
 
 
 def _field(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The gyroid function (N,) and its gradient (N,3), 1/mm."""
+    """Compute the gyroid function (N,) and its gradient (N,3), 1/mm, at points (N,3)."""
     k = 2 * math.pi / _PERIOD
     s, c = np.sin(k * p), np.cos(k * p)
     value = s[:, 0] * c[:, 1] + s[:, 1] * c[:, 2] + s[:, 2] * c[:, 0]
@@ -42,20 +42,20 @@ def _field(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _onto(positions: np.ndarray) -> np.ndarray:
-    """Positions moved onto the gyroid by one Newton step."""
+    """Move positions (N,3) towards the gyroid by one Newton step."""
     value, gradient = _field(positions)
     return positions - gradient * (value / np.maximum((gradient**2).sum(axis=1), 1e-3))[:, None]
 
 
 def _sheet(spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """The gyroid itself in a box a little larger than the ball, evenly triangulated."""
+    """Triangulate the gyroid evenly in a box that is slightly larger than the ball."""
     from skimage.measure import marching_cubes
 
     cells = math.ceil((_RADIUS + 2 * spacing) / spacing)
     axis = np.arange(-cells, cells + 1) * spacing
     s, c = (f(2 * math.pi / _PERIOD * axis) for f in (np.sin, np.cos))
     value = s[:, None, None] * c[:, None] + s[:, None] * c + s * c[:, None, None]
-    value = np.where(np.abs(value) < 0.02, np.where(value < 0, -0.02, 0.02), value)  # no triangles without area
+    value = np.where(np.abs(value) < 0.02, np.where(value < 0, -0.02, 0.02), value)  # avoids triangles without area
     positions, faces, _, _ = marching_cubes(value.astype(np.float32), 0.0, allow_degenerate=False)
     positions = (positions - cells) * spacing
     for _ in range(4):
@@ -67,17 +67,18 @@ def _sheet(spacing: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(positions: np.ndarray, faces: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """The part of the sheet within the ball, less the rounding of the rim; vertices close to the cut move onto it."""
+    """Cut the sheet by the ball, minus the radius of the rim. Vertices close to the cut move onto it."""
     radius = _RADIUS - _WALL / 2
     beyond = np.linalg.norm(positions, axis=1) - radius
     near = np.abs(beyond) < 0.35 * spacing
     positions[near] = _onto_cut(positions[near], radius)
     side = np.where(near, 0, np.sign(beyond)).astype(int)
 
-    kept = faces[(side[faces] <= 0).all(axis=1) & (side[faces] < 0).any(axis=1)]
+    inside = faces[(side[faces] <= 0).all(axis=1) & (side[faces] < 0).any(axis=1)]
     crossed = faces[(side[faces] > 0).any(axis=1) & (side[faces] < 0).any(axis=1)]
     outside = (side[crossed] > 0).sum(axis=1)
-    # Turn each crossed triangle so that its odd corner comes first: the one outside, or the one inside of two outside.
+    # Rotate the corners of each crossed triangle so that the single one comes first: the only corner outside, or the
+    # only one inside.
     first = np.argmax(np.where((outside == 1)[:, None], side[crossed] > 0, side[crossed] < 0), axis=1)
     a, b, c = (np.take_along_axis(crossed, ((first + k) % 3)[:, None], axis=1)[:, 0] for k in range(3))
 
@@ -89,11 +90,11 @@ def _cut(positions: np.ndarray, faces: np.ndarray, spacing: float) -> tuple[np.n
     new = np.full(len(spans), -1)
     new[split] = len(positions) + which.ravel()
     ab, ac = np.split(new, 2)
-    # A corner that lies on the cut stands for the point where the cut meets its edge.
+    # If a corner lies on the cut, the cut meets its edge at this corner.
     ab, ac = np.where(ab < 0, b, ab), np.where(ac < 0, c, ac)
     tip = outside == 2
     pieces = [
-        kept,
+        inside,
         np.stack([a, ab, ac], 1)[tip],
         np.stack([ab, b, c], 1)[~tip & (side[b] < 0)],
         np.stack([ab, c, ac], 1)[~tip & (side[c] < 0)],
@@ -102,14 +103,14 @@ def _cut(positions: np.ndarray, faces: np.ndarray, spacing: float) -> tuple[np.n
 
 
 def _onto_cut(positions: np.ndarray, radius: float) -> np.ndarray:
-    """Positions moved onto the curve where gyroid and ball meet, by Newton steps in the plane of both gradients."""
+    """Move positions (N,3) onto the intersection of gyroid and ball, by Newton steps in the plane of both gradients."""
     for _ in range(4):
         _, gradient = _field(positions)
         normal = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
         distance = np.linalg.norm(positions, axis=1)
         out = positions / distance[:, None]
         along = out - normal * np.sum(out * normal, axis=1, keepdims=True)
-        # Where the ball nearly touches the sheet the curve is far: go there slowly.
+        # Where the ball is nearly tangent to the sheet, the curve is far: limit the step.
         size = np.maximum(np.sum(along**2, axis=1), 0.1)
         positions = positions - along * ((distance - radius) / size)[:, None]
         positions = _onto(positions)
@@ -117,7 +118,7 @@ def _onto_cut(positions: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _largest_piece(faces: np.ndarray) -> np.ndarray:
-    """The faces of the largest connected piece whose rim passes no vertex twice."""
+    """Return the faces of the largest connected piece, without faces at vertices that the rim passes twice."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -135,14 +136,14 @@ def _largest_piece(faces: np.ndarray) -> np.ndarray:
 
 
 def _rim(faces: np.ndarray) -> np.ndarray:
-    """Edges (E,2) of one face only, in the direction in which that face has them."""
+    """Return the edges (E,2) that belong to one face only, in the direction of that face."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     size = int(faces.max()) + 1
     return edges[~np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])]
 
 
 def _thicken(positions: np.ndarray, faces: np.ndarray, spacing: float) -> Mesh:
-    """The sheet as a wall: a copy on either side, joined by half-round strips along the rim."""
+    """Turn the sheet into a wall: a copy on each side, joined by half-round strips along the rim."""
     _, gradient = _field(positions)
     normal = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     rim = _rim(faces)

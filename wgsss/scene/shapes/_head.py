@@ -1,4 +1,4 @@
-"""A head with a neck, plain enough to stand in a crowd and, smaller, on a statue."""
+"""A head with a neck, also used for the statue."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _AREA = 120_000.0  # mm^2
 
 
 def head(vertices: int | None = None) -> Mesh:
-    """A head facing +z, y up, about 160 x 230 x 215 mm, with its middle at the origin; closed, one piece.
+    """Build a head facing +z, y up, about 160 x 230 x 215 mm, centred at the origin; closed, one piece.
 
     Vertices: 1000 to 500000, by default 10000. Raises InputError for another count.
     """
-    wanted = vertex_count("head", vertices, 10_000, 1000, 500_000)
-    spacing = spacing_for(wanted, _AREA)
+    target = vertex_count("head", vertices, 10_000, 1000, 500_000)
+    spacing = spacing_for(target, _AREA)
 
     def bust(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         return carve(head_distance(x, y, z), y + 115, 8.0)
@@ -28,8 +28,8 @@ def head(vertices: int | None = None) -> Mesh:
 
 
 def head_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Signed distance, mm, to the head, whose neck goes on below y = -115."""
-    x = np.sqrt(x * x + 0.25) - 0.5  # both halves at once, rounded across the middle
+    """Compute the signed distance, mm, to the head. Its neck continues below y = -115."""
+    x = np.sqrt(x * x + 0.25) - 0.5  # symmetric halves, smooth across the middle
     d = ellipsoid(x, y, z, (0, 38, -14), (71, 77, 91))
     d = join(d, ellipsoid(x, y, z, (0, 0, 26), (53, 72, 58)), 30.0)
     d = join(d, ellipsoid(x, y, z, (0, -42, 32), (38, 34, 42)), 24.0)
@@ -39,7 +39,7 @@ def head_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     d = join(d, limb(x, y, z, (0, -30, -22), (0, -140, -36), 42, 50), 26.0)  # neck
     d = join(d, limb(x, y, z, (48, 10, -14), (9, -112, 12), 9, 8), 16.0)  # muscle from ear to collar
 
-    # Eyes: a socket, in it the ball, and lids over the ball.
+    # Eyes: a socket, the eyeball in it, and lids over the eyeball.
     d = carve(d, ellipsoid(x, y, z, (29, 15, 89), (17, 10, 15)), 14.0)
     d = join(d, limb(x, y, z, (8, 29, 78), (43, 29, 63), 7, 5), 14.0)  # brow
     d = join(d, ellipsoid(x, y, z, (29, 14, 64), (14, 10, 13)), 3.0)

@@ -7,36 +7,36 @@ import numpy as np
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes._rows import fit_spacing, join_rows, vertex_count
 
-_LENGTH = 80.0  # mm, stem included
+_LENGTH = 80.0  # mm, with the stem
 _STEM = 9.0  # mm
 _HALF_WIDTH = 19.0  # mm, of the blade
 _BLADE = 0.35  # mm, thickness between the veins
 _STEM_RADIUS = 0.8  # mm
 _VEIN_SPACING = 8.0  # mm along the midrib; left and right alternate
-_EDGE = 0.15  # mm, over which the rim of the blade rounds off
+_EDGE = 0.15  # mm, width over which the rim of the blade is rounded
 
 
 def leaf(vertices: int | None = None) -> Mesh:
-    """A leaf along +y from the stem's end at the origin, upper side towards +z: 80 x 38 mm, 0.35 mm between the veins.
+    """Build a leaf along +y with the end of the stem at the origin and its upper side towards +z: 80 x 38 mm.
 
-    Midrib and side veins stand out below, up to 1.3 mm in all. One closed surface.
-    Vertices: 1000 to 500000, by default 14000. Raises InputError for another count.
+    It is 0.35 mm thick between the veins, and up to 1.3 mm at the midrib and side veins, which stand out below. The
+    surface is closed. Vertices: 1000 to 500000, by default 14000. Raises InputError for another count.
     """
-    wanted = vertex_count("leaf", vertices, 14_000, 1000, 500_000)
+    target = vertex_count("leaf", vertices, 14_000, 1000, 500_000)
 
     def rows(spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Height along the leaf, half width and points of each row, the two ends being single points."""
+        """Return y, half width and number of points of each row. The rows at both ends are single points."""
         y = np.linspace(0, _LENGTH, round(_LENGTH / (0.866 * spacing)) + 1)
         width = _half_width(y)
         counts = np.maximum(np.round(2 * width / spacing), 2).astype(int) + 3
         counts[[0, -1]] = 1
         return y, width, counts
 
-    y, width, counts = rows(fit_spacing(lambda h: 2 * int(rows(h)[2].sum() - rows(h)[2].size), wanted))
+    y, width, counts = rows(fit_spacing(lambda h: 2 * int(rows(h)[2].sum() - rows(h)[2].size), target))
     row = np.repeat(np.arange(len(counts)), counts)
     index = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
     last = counts[row] - 1
-    # The rim itself, a point just inside it on either side, and the rest evenly between these.
+    # A row has points on the rim, one point just inside the rim on each side, and evenly spaced points between these.
     inset = np.minimum(_EDGE / np.maximum(width, 1e-9), 0.3)[row]
     even = (index - 1) / np.maximum(last - 2, 1) * 2 - 1
     across = np.where(index == 0, -1.0, np.where(index == last, 1.0, even * (1 - inset)))
@@ -60,7 +60,7 @@ def leaf(vertices: int | None = None) -> Mesh:
 
 
 def _half_width(y: np.ndarray) -> np.ndarray:
-    """Half the width, mm, of stem and blade at a height y, mm; 0 at both ends."""
+    """Compute half the width, mm, of stem and blade at y, mm; it is 0 at both ends."""
     along = np.clip((y - _STEM) / (_LENGTH - _STEM), 0, 1)
     blade = _HALF_WIDTH * np.sin(np.pi * along**0.72) ** 1.1
     stem = _STEM_RADIUS * np.sqrt(np.clip(1 - (1 - np.clip(y / _STEM_RADIUS, 0, 1)) ** 2, 0, 1)) * (1 - along)
@@ -68,18 +68,18 @@ def _half_width(y: np.ndarray) -> np.ndarray:
 
 
 def _vein_phase(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whole numbers on the side veins, which leave the midrib at 45 degrees and bend towards the tip."""
+    """Compute a phase that is a whole number on side veins. They leave the midrib at 45 degrees and bend to the tip."""
     beside = np.abs(x)
     return (y - 0.75 * beside - 0.012 * beside**2 - _STEM) / _VEIN_SPACING + 0.5 * (x > 0)
 
 
 def _veins(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """What midrib, stem and side veins add to the thickness of the blade, mm."""
+    """Compute the thickness, mm, that midrib, stem and side veins add to the blade."""
     along = np.clip((y - _STEM) / (_LENGTH - _STEM), 0, 1)
     midrib = (0.95 * (1 - along) + 0.1) * np.exp(-0.5 * (x / (0.9 - 0.4 * along)) ** 2)
     stem = (2 * _STEM_RADIUS - _BLADE) * np.clip(1 - (y - 0.6 * _STEM) / _STEM, 0, 1) ** 2
     phase = _vein_phase(x, y)
-    away = np.abs(phase - np.round(phase)) * _VEIN_SPACING * 0.75  # across the vein: cos of its slope
+    away = np.abs(phase - np.round(phase)) * _VEIN_SPACING * 0.75  # times the cosine of the slope of the vein
     fade = np.clip(1.15 - np.abs(x) / np.maximum(_half_width(y), 1e-9), 0, 1) * np.clip(4 * along * (1 - along), 0, 1)
     side = 0.32 * fade * np.exp(-0.5 * (away / 0.42) ** 2)
     on_stem = np.clip((0.5 * _STEM - y) / _STEM + 1, 0, 1) * (np.abs(x) < 2 * _STEM_RADIUS)
@@ -87,7 +87,7 @@ def _veins(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def _middle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Height, mm, of the middle of the sheet: folded along the midrib, arched, quilted between the veins."""
+    """Compute the height, mm, of the middle of the sheet: a fold at the midrib, an arch, bulges between the veins."""
     fold = 0.22 * (np.sqrt(x**2 + 4) - 2)
     arch = -0.0035 * (y - 30) ** 2 - 0.004 * x**2
     half_width = _half_width(y)

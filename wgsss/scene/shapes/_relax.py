@@ -1,4 +1,4 @@
-"""Moves a mesh's vertices along its surface until its triangles are well shaped."""
+"""Tangential smoothing, which moves the vertices of a mesh along its surface to improve the triangles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Area-weighted unit normals (V,3)."""
+    """Compute area-weighted unit normals (V,3)."""
     a, b, c = (positions[faces[:, k]] for k in range(3))
     weighted = np.cross(b - a, c - a)
     normals = np.stack(
@@ -16,7 +16,7 @@ def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def neighbour_mean(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Mean (V,3) of the vertices next to each one, on a closed mesh (each neighbour then counts twice)."""
+    """Compute the mean (V,3) of the neighbours of each vertex of a closed mesh. Each neighbour is counted twice."""
     ends = faces.ravel()
     others = positions[np.roll(faces, -1, axis=1).ravel()] + positions[np.roll(faces, 1, axis=1).ravel()]
     degree = np.maximum(2.0 * np.bincount(ends, minlength=len(positions)), 1.0)
@@ -24,7 +24,7 @@ def neighbour_mean(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def relax(positions: np.ndarray, faces: np.ndarray, *, steps: int) -> np.ndarray:
-    """Laplacian smoothing with the normal part taken out: the shape stays to second order, the triangles even out."""
+    """Apply Laplacian smoothing without its normal component: triangles become more even, the shape changes little."""
     for _ in range(steps):
         move = neighbour_mean(positions, faces) - positions
         normals = vertex_normals(positions, faces)

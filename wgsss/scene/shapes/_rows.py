@@ -1,4 +1,4 @@
-"""Triangulated strips between rows of points: how the shapes given by a parametrisation get well-shaped triangles."""
+"""Triangulation of strips between rows of points, for parametric shapes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wgsss.errors import InputError
 
 
 def vertex_count(shape: str, vertices: int | None, default: int, low: int, high: int) -> int:
-    """The approximate vertex count to aim at. Raises InputError outside low..high."""
+    """Return the number of vertices to aim at. Raises InputError if `vertices` is outside low..high."""
     if vertices is None:
         return default
     if not isinstance(vertices, int) or not low <= vertices <= high:
@@ -20,7 +20,7 @@ def vertex_count(shape: str, vertices: int | None, default: int, low: int, high:
 
 
 def fit_spacing(count: Callable[[float], int], vertices: int) -> float:
-    """The spacing, mm, at which `count(spacing)` (falling with the spacing) is nearest to `vertices`."""
+    """Find the spacing, mm, at which `count(spacing)`, a decreasing function, is nearest to `vertices`."""
     low, high = 0.01, 100.0
     for _ in range(24):
         middle = math.sqrt(low * high)
@@ -29,7 +29,7 @@ def fit_spacing(count: Callable[[float], int], vertices: int) -> float:
 
 
 def spread(counts: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Evenly spaced parameters (sum(counts),), row after row: 0..1 with both ends, or [0, 1) around closed rows."""
+    """Return evenly spaced parameters (sum(counts),), row after row: 0..1 with both ends, or [0, 1) for closed rows."""
     row = np.repeat(np.arange(len(counts)), counts)
     index = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
     gaps = counts if closed else np.maximum(counts - 1, 1)
@@ -37,11 +37,11 @@ def spread(counts: np.ndarray, *, closed: bool) -> np.ndarray:
 
 
 def join_rows(counts: np.ndarray, params: np.ndarray, *, closed: bool) -> np.ndarray:
-    """Faces (F,3) between each row of points and the next; rows of one point become fans.
+    """Triangulate the strips between successive rows of points: faces (F,3). A row of one point gives a fan.
 
-    counts (R,): points per row; params (sum(counts),): rising within each row, 0..1. Seen with the parameter to the
-    right and the next row above, the triangles are counter-clockwise. Edges advance in the order of their middles, so
-    rows of different counts meet without slivers.
+    counts (R,): points per row; params (sum(counts),): increasing within each row, 0..1. If the parameter increases to
+    the right and the next row is above, triangles are counter-clockwise. The edges of both rows of a strip are sorted
+    by their midpoints, so that rows of different counts are joined without slivers.
     """
     starts = np.cumsum(counts) - counts
     edges = np.where(counts > 1, counts if closed else counts - 1, 0)
@@ -51,7 +51,7 @@ def join_rows(counts: np.ndarray, params: np.ndarray, *, closed: bool) -> np.nda
     tail = starts[row] + (edge + 1) % counts[row]
     middle = 0.5 * (params[head] + params[tail] + (tail < head))
 
-    # Each row's edges stand below the strip with the next row and above the strip with the previous one.
+    # Each edge of a row borders the strip to the next row from below, and the strip to the previous row from above.
     strip = np.concatenate([row, row - 1])
     lower = np.repeat([True, False], len(row))
     real = (strip >= 0) & (strip < len(counts) - 1)
@@ -59,11 +59,11 @@ def join_rows(counts: np.ndarray, params: np.ndarray, *, closed: bool) -> np.nda
     strip, lower = strip[real][order], lower[real][order]
     head, tail = (np.concatenate([a, a])[real][order] for a in (head, tail))
 
-    def passed(mine: np.ndarray, owner: np.ndarray) -> np.ndarray:
-        """The point reached on the other side: as many edges along its row as came before within this strip."""
-        before = np.cumsum(mine) - mine
+    def reached(edges: np.ndarray, row: np.ndarray) -> np.ndarray:
+        """Return the point on the opposite `row` of each edge: the number of opposite edges before it in its strip."""
+        before = np.cumsum(edges) - edges
         first = np.searchsorted(strip, strip)
-        return starts[owner] + (before - before[first]) % counts[owner]
+        return starts[row] + (before - before[first]) % counts[row]
 
-    apex = np.where(lower, passed(~lower, strip + 1), passed(lower, strip))
+    apex = np.where(lower, reached(~lower, strip + 1), reached(lower, strip))
     return np.where(lower[:, None], np.stack([head, tail, apex], 1), np.stack([tail, head, apex], 1)).astype(np.int32)

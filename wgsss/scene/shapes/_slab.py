@@ -1,4 +1,4 @@
-"""A flat box with hard edges, with texture coordinates of its own."""
+"""A flat box with hard edges and texture coordinates."""
 
 from __future__ import annotations
 
@@ -8,30 +8,32 @@ from wgsss.errors import InputError
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes._rows import fit_spacing, vertex_count
 
-# Each side of the box: the axes its grid runs along, the axis of its normal, and which end that is. The first two axes
-# crossed give the outward normal.
+# For each side of the box: the two axes of its grid, the axis of its normal, and whether it is at the end (1) or the
+# beginning (0) of this axis. The cross product of the first two axes is the outward normal.
 _SIDES = ((0, 1, 2, 1), (1, 0, 2, 0), (1, 2, 0, 1), (2, 1, 0, 0), (2, 0, 1, 1), (0, 2, 1, 0))
-_GUTTER = 0.02  # of the width of the map, around every chart: 10 texels at 512
+_GUTTER = 0.02  # gap around each chart, as a share of the width of the map: 10 texels at 512
 
 
 def slab(size: tuple[float, float, float] = (40.0, 40.0, 4.0), vertices: int | None = None) -> Mesh:
-    """A box of `size` (x, y, z) mm about the origin with flat corner normals and one chart per side.
+    """Build a box of `size` (x, y, z) mm about the origin with flat normals and one chart per side.
 
-    Positions are welded over the edges; all six charts have the same scale, upright as seen from outside, and lie apart
-    by gutters. Vertices: 100 to 1000000, by default 6000. Raises InputError for another count or a size out of range.
+    Positions are shared across the edges. All six charts have the same scale, are upright as seen from outside, and are
+    separated by gutters. Vertices: 100 to 1000000, by default 6000. Raises InputError for another count, or if a size
+    is out of range.
     """
     if len(size) != 3 or not all(0 < s <= 1e9 for s in size):
         raise InputError(f"slab: size must be three lengths above 0 mm, at most 1e9, got {tuple(size)}")
-    wanted = vertex_count("slab", vertices, 6000, 100, 1_000_000)
+    target = vertex_count("slab", vertices, 6000, 100, 1_000_000)
 
     def cells_at(spacing: float) -> np.ndarray:
+        """Return the number of cells along each axis: (3,)."""
         return np.maximum(np.round(np.array(size) / spacing), 1).astype(int)
 
     def count(spacing: float) -> int:
         x, y, z = (int(n) for n in cells_at(spacing))
         return 2 * (x * y + y * z + z * x) + 2
 
-    cells = cells_at(fit_spacing(count, wanted))
+    cells = cells_at(fit_spacing(count, target))
     origins, scale = _charts(size)
 
     points, corner_uvs, corner_normals, quads = [], [], [], []
@@ -64,7 +66,7 @@ def slab(size: tuple[float, float, float] = (40.0, 40.0, 4.0), vertices: int | N
 
 
 def _charts(size: tuple[float, float, float]) -> tuple[np.ndarray, float]:
-    """Upper left corners (6,2) of the charts in the unit square and the scale, 1/mm: two shelves of charts."""
+    """Place the charts in two rows: upper left corners (6,2) in the unit square, and the scale, 1/mm."""
     extents = np.array([(size[a], size[b]) for a, b, _, _ in _SIDES])
     shelves = ((0, 1), (2, 3, 4, 5)) if size[2] <= max(size[:2]) else ((0, 1, 2), (3, 4, 5))
     widest = max(extents[list(s), 0].sum() / (1 - _GUTTER * (len(s) + 1)) for s in shelves)

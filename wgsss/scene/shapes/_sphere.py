@@ -12,14 +12,14 @@ from wgsss.scene.shapes._rows import vertex_count
 
 
 def sphere(radius: float = 20.0, vertices: int | None = None) -> Mesh:
-    """A sphere of `radius` mm about the origin: an icosahedron whose edges are cut into f parts, 10 f^2 + 2 vertices.
+    """Build a sphere of `radius` mm about the origin: an icosahedron with edges divided by f, 10 f^2 + 2 vertices.
 
     Vertices: 90 to 1000000, by default 4000. Raises InputError for another count or a radius out of range.
     """
     if not 0 < radius <= 1e9:
         raise InputError(f"sphere: radius must be above 0 mm, at most 1e9, got {radius}")
-    wanted = vertex_count("sphere", vertices, 4000, 90, 1_000_000)
-    frequency = round(math.sqrt((wanted - 2) / 10))
+    target = vertex_count("sphere", vertices, 4000, 90, 1_000_000)
+    frequency = round(math.sqrt((target - 2) / 10))
     corners, triangles = _icosahedron()
 
     i, j = (k.ravel() for k in np.meshgrid(np.arange(frequency + 1), np.arange(frequency + 1), indexing="ij"))
@@ -34,7 +34,7 @@ def sphere(radius: float = 20.0, vertices: int | None = None) -> Mesh:
     flipped = np.stack([index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]], axis=1)
     patch = np.concatenate([upright, flipped])
 
-    # A lattice point shared by two patches has the same integer weights on the same corners, so it welds exactly.
+    # A lattice point of two patches has the same integer weights for the same corners in both, so it is merged exactly.
     barycentric = np.zeros((20, len(weights), 12), dtype=np.int16)
     np.put_along_axis(barycentric, np.broadcast_to(triangles[:, None, :], (20, len(weights), 3)), weights[None], axis=2)
     key = np.sort(np.where(barycentric > 0, np.arange(12) * (frequency + 1) + barycentric, 0), axis=2)[..., -3:]
@@ -46,7 +46,7 @@ def sphere(radius: float = 20.0, vertices: int | None = None) -> Mesh:
 
 
 def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
-    """Unit corners (12,3) and faces (20,3), counter-clockwise from outside."""
+    """Return the unit corners (12,3) and faces (20,3) of an icosahedron, counter-clockwise from outside."""
     golden = (1 + math.sqrt(5)) / 2
     signs = [(s, t) for s in (-1, 1) for t in (-1, 1)]
     corners = np.array([np.roll((0, s, t * golden), k) for k in range(3) for s, t in signs]) / math.hypot(1, golden)

@@ -1,4 +1,4 @@
-"""A small carved figure, seated on a lotus: robe, folds, curls and petals down to half a millimetre."""
+"""A small carved figure, seated on a lotus, with details down to half a millimetre."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ _HEAD_CENTRE = (0.0, 116.0, 3.0)
 
 
 def statue(vertices: int | None = None) -> Mesh:
-    """A figure seated on a lotus, facing +z, y up from its foot at 0: 150 mm tall, 100 mm wide; closed, one piece.
+    """Build a figure seated on a lotus, facing +z, y up from 0: 150 mm tall, 100 mm wide; closed, one piece.
 
-    The same shape at every count; fine folds and curls need some 100000 to show.
-    Vertices: 5000 to 500000, by default 20000. Raises InputError for another count.
+    The shape does not depend on the number of vertices, but fine folds and curls need about 100000. Vertices:
+    5000 to 500000, by default 20000. Raises InputError for another count.
     """
-    wanted = vertex_count("statue", vertices, 20_000, 5000, 500_000)
-    spacing = spacing_for(wanted, _AREA)
+    target = vertex_count("statue", vertices, 20_000, 5000, 500_000)
+    spacing = spacing_for(target, _AREA)
     positions, faces = extract(_figure, (-56, -4, -52), (56, 156, 56), spacing, steepness=1.8)
     return Mesh(positions=positions.astype(np.float32), faces=faces, name="statue")
 
 
 def _figure(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Signed distance, mm, to the whole figure."""
+    """Compute the signed distance, mm, to the figure."""
     return join(join(_body(x, y, z), _lotus(x, y, z), 1.5), _carved_head(x, y, z), 2.0)
 
 
 def _lotus(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A drum between two rings of petals, flat below."""
+    """Compute the signed distance to the lotus: a drum with two rings of petals, flat below."""
     r = np.sqrt(x * x + 1.25 * z * z)
     turn = np.arctan2(1.12 * z, x)
     d = np.maximum(r - 41, np.abs(y - 12) - 11)
@@ -50,8 +50,8 @@ def _lotus(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def _body(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Torso, crossed legs and arms under a robe that leaves the figure's right shoulder (-x) bare."""
-    # Legs: thighs outwards, shins back in, one before the other.
+    """Compute the signed distance to torso, crossed legs and arms, in a robe that leaves one shoulder (-x) bare."""
+    # Legs: the thighs point outwards and the shins inwards, one in front of the other.
     side = np.abs(x)
     robe = limb(side, y, z, (12, 32, -8), (35, 31, 17), 12.5, 9.5)
     robe = join(robe, limb(x, y, z, (36, 30, 17), (-10, 28.5, 29), 9.0, 6.0), 3.0)
@@ -73,7 +73,7 @@ def _body(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     arm = join(arm, limb(side, y, z, (8, 43, 31), (0.5, 46.5, 32), 1.9, 1.6), 1.2)
     whole = join(torso, arm, 5.0)
 
-    # The robe lies over all but the right arm, shoulder and chest; its hem is a roll along a slanting plane.
+    # The robe covers all except the right arm, shoulder and chest. Its hem is a roll along an inclined plane.
     slant = 0.80 * (x + 9) - 0.60 * (y - 74) + 0.10 * z
     covered = np.clip(slant / 2.4 + 0.5, 0, 1)
     covered = covered * covered * (3 - 2 * covered)
@@ -89,24 +89,24 @@ def _body(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def _folds(phase: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Rounded folds with sharp valleys, -1..1 over one unit of phase, fading a few mm from the surface."""
+    """Compute rounded folds with sharp valleys, -1..1, one per unit of phase. They fade a few mm from the surface."""
     wave = 2 * np.abs(np.sin(math.pi * phase)) - 1
     return wave * np.clip(1.5 - np.abs(distance) / 4, 0, 1)
 
 
 def _carved_head(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """The head, its hair in curls up to a bun, with the long ear lobes of such figures."""
+    """Compute the signed distance to the head: curly hair with a bun, and long ear lobes."""
     u, v, w = ((p - c) / _HEAD_SCALE for p, c in zip((x, y, z), _HEAD_CENTRE, strict=True))
     face = carve(head_distance(u, v, w), v + 85, 20.0)
     hair = join(ellipsoid(u, v, w, (0, 42, -16), (75, 79, 92)), ball(u, v, w, (0, 131, -16), 41), 24.0)
-    # Curls sit in rings about the crown, as many in each as there is room for.
+    # Curls lie in rings around the crown. Each ring holds as many as fit.
     polar = np.arctan2(np.sqrt(u * u + (w + 16) ** 2), v - 30)
     ring = polar / 0.165
     curls = np.maximum(np.round(2 * math.pi * np.sin(np.minimum((np.floor(ring) + 0.5) * 0.165, 1.7)) / 0.165), 4)
     column = np.arctan2(w + 16, u) / (2 * math.pi) * curls
     bump = np.sin(math.pi * (ring - np.floor(ring))) * np.abs(np.sin(math.pi * column))
     hair = hair - 4.0 * np.sqrt(bump) + 1.0
-    # The hairline: hair above a plane that rises over the forehead and falls behind the ears.
+    # The hairline: hair grows above a curved surface that rises over the forehead and falls behind the ears.
     line = 0.86 * (v - 66) - 0.52 * (w - 66) + 0.0016 * u * u
     hair = np.maximum(hair, -0.9 * line)
     face = join(face, hair, 3.0)

@@ -1,4 +1,4 @@
-"""Reading glTF 2.0 files (.gltf and .glb): https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html"""
+"""Reader of glTF 2.0 files (.gltf and .glb): https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html"""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from wgsss.scene.files.gltf.rig import read_rig
 from wgsss.scene.files.gltf.views import read_cameras, read_lights
 
 MM_PER_UNIT = 1000.0
-"""its unit is the metre"""
+"""glTF files are in metres"""
 
 
 def read_gltf(path: Path) -> Contents:
-    """What the scene of a glTF file shows, and notes on what of it is left out. Images are not decoded.
+    """Read the scene of a glTF file, with notes on data that are left out. Images are not decoded.
 
-    Raises InputError, in one line that names the file and the place in it, for a file that is missing, damaged or
-    without triangles, that is not glTF 2, or that requires an extension which cannot be read.
+    Raises InputError, in one line that names the file and the location in it, if the file is missing, is damaged, has
+    no triangles, is not glTF 2, or requires an extension that cannot be read.
     """
     with damaged(path):
         document, notes = Document(path), Notes()
         check_required(document)
-        stage = read_nodes(document)
-        placed = read_parts(document, stage, notes)
-        rig = read_rig(document, stage, placed, notes)
-        animations = {} if rig is None else read_animations(path, document, stage.nodes.rest, notes)
-        lights, cameras = read_lights(document, stage, notes), read_cameras(document, stage, notes)
+        scene = read_nodes(document)
+        placed = read_parts(document, scene, notes)
+        rig = read_rig(document, scene, placed, notes)
+        animations = {} if rig is None else read_animations(path, document, scene.nodes.rest, notes)
+        lights, cameras = read_lights(document, scene, notes), read_cameras(document, scene, notes)
         note_unknown(document, notes)
-        parts = tuple(one.part for one in placed)
+        parts = tuple(primitive.part for primitive in placed)
         return Contents(
             parts,
             mm_per_unit=MM_PER_UNIT,

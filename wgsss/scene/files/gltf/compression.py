@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene.files.gltf.fields import Item, plain
+from wgsss.scene.files.gltf.fields import Item, printable
 
 Array = npt.NDArray[Any]
 
@@ -38,7 +38,7 @@ def _loaded(package: str, packed: Item) -> Any:
     try:
         return importlib.import_module(package)
     except ImportError as error:
-        raise packed.error(f"the package {package} cannot be loaded ({plain(str(error))})") from None
+        raise packed.error(f"the package {package} cannot be loaded ({printable(str(error))})") from None
 
 
 def decode_view(view: Item, packed: Item, data: memoryview) -> memoryview:
@@ -50,15 +50,15 @@ def decode_view(view: Item, packed: Item, data: memoryview) -> memoryview:
     kind = packed.text("filter", "NONE", choices=("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"))
     count, stride, length = packed.whole("count"), packed.whole("byteStride", low=1), view.whole("byteLength")
     if count * stride != length:
-        raise packed.error(f"its {count} rows of {stride} bytes are not the {length} bytes of {view.where}")
+        raise packed.error(f"its {count} rows of {stride} bytes do not make the {length} bytes of {view.location}")
     if length > _MESHOPT_GROWTH * (len(data) + 1):
         raise packed.error(f"{len(data)} bytes cannot hold its {count} rows")
     package = _loaded("meshopt", packed)
     try:
-        found: Array = package.decode_gltf_buffer(bytes(data), count, stride, mode, kind)
+        rows: Array = package.decode_gltf_buffer(bytes(data), count, stride, mode, kind)
     except (ValueError, TypeError, RuntimeError):
         raise packed.error("damaged: it cannot be decoded") from None
-    return memoryview(np.ascontiguousarray(found).tobytes())
+    return memoryview(np.ascontiguousarray(rows).tobytes())
 
 
 def decode_primitive(packed: Item, data: memoryview) -> tuple[dict[str, Array], Array]:
@@ -67,20 +67,20 @@ def decode_primitive(packed: Item, data: memoryview) -> tuple[dict[str, Array], 
     Returns the attributes by name, (V, C) as stored, and the faces, int64 (F, 3). Raises InputError if the data are
     damaged, or if an attribute is not in them.
     """
-    names = packed.item("attributes") or Item({}, packed.where)
+    names = packed.item("attributes") or Item({}, packed.location)
     package = _loaded("DracoPy", packed)
     try:
         mesh = package.decode(bytes(data))
         stored = {attribute["unique_id"]: np.asarray(attribute["data"]) for attribute in mesh.attributes}
         faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-    except Exception:  # its own exceptions, and an AttributeError for a cloud of points
+    except Exception:  # exceptions of DracoPy, and an AttributeError for a point cloud
         raise packed.error(f"damaged: buffer view {packed.get('bufferView')} cannot be decoded") from None
-    found = {}
+    decoded = {}
     for name in names.values:
         number = names.whole(name)
         if number not in stored:
             raise packed.error(f"{name}: there is no attribute {number} in the compressed data")
-        found[name] = stored[number].reshape(len(stored[number]), -1)
-    if len({len(values) for values in found.values()}) > 1:
-        raise packed.error("its attributes are not of the same length")
-    return found, faces
+        decoded[name] = stored[number].reshape(len(stored[number]), -1)
+    if len({len(values) for values in decoded.values()}) > 1:
+        raise packed.error("its attributes have different lengths")
+    return decoded, faces

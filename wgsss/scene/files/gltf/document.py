@@ -1,4 +1,4 @@
-"""A glTF file as its JSON and the numbers behind it: buffers, buffer views and accessors (glTF 2.0, section 3.6)."""
+"""The JSON of a glTF file, and its numbers in buffers, buffer views and accessors (glTF 2.0, section 3.6)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.scene.files.gltf import compression
 from wgsss.scene.files.gltf.container import data_of, file_of, read_container
-from wgsss.scene.files.gltf.fields import Item, as_whole, plain, shown
+from wgsss.scene.files.gltf.fields import Item, as_whole, json_text, printable
 
 Array = npt.NDArray[Any]
 
@@ -25,9 +25,9 @@ SHAPES = {
     "MAT3": (3, 3),
     "MAT4": (4, 4),
 }
-"""columns and rows"""
+"""columns and rows of each type of an accessor"""
 MAX_ZEROS = 1 << 22
-"""rows of an accessor without a buffer view, which no data bounds"""
+"""limit of the rows of an accessor without buffer view, since no data limit them"""
 
 _NAMES = {
     "accessor": "accessors",
@@ -47,7 +47,11 @@ _NAMES = {
 
 
 class Document:
-    """A file's JSON and its data, which are read when asked for. Methods raise InputError without the file's name."""
+    """The JSON of a file, and its data, which are read on demand.
+
+    Methods raise InputError without the name of the file. The argument `label` of a method names the owner of the data
+    in errors.
+    """
 
     def __init__(self, path: Path) -> None:
         self.folder = path.parent
@@ -57,36 +61,36 @@ class Document:
         self._views: dict[int, tuple[memoryview, int | None]] = {}
 
     def all(self, kind: str) -> list[Item]:
-        """All that the file has of a kind: "node", "buffer view" and so on."""
+        """Return all objects of a kind, such as "node" or "buffer view"."""
         if kind not in self._lists:
             self._lists[kind] = self.root.items(_NAMES[kind], kind)
         return self._lists[kind]
 
-    def at(self, kind: str, index: Any, what: str) -> Item:
-        """The one of a number. `what` refers to it goes into errors."""
-        number, found = as_whole(index), self.all(kind)
-        if number is None or not 0 <= number < len(found):
-            raise InputError(f"{what}: there is no {kind} {shown(index)}")
-        return found[number]
+    def at(self, kind: str, index: Any, label: str) -> Item:
+        """Return the object of a kind at an index. Raises InputError if there is none."""
+        number, items = as_whole(index), self.all(kind)
+        if number is None or not 0 <= number < len(items):
+            raise InputError(f"{label}: there is no {kind} {json_text(index)}")
+        return items[number]
 
     def link(self, item: Item, key: str, kind: str) -> int | None:
-        """The number that an object gives of something of a kind; None where it gives none."""
+        """Read and check the index of an object of a kind in a field. Return None if the field is missing."""
         if not item.has(key):
             return None
-        self.at(kind, item.get(key), item.where or key)
+        self.at(kind, item.get(key), item.location or key)
         return as_whole(item.get(key))
 
-    def buffer(self, index: Any, what: str) -> memoryview:
-        """The bytes of a buffer."""
-        item = self.at("buffer", index, what)
+    def buffer(self, index: Any, label: str) -> memoryview:
+        """Return the bytes of a buffer."""
+        item = self.at("buffer", index, label)
         number = int(index)
         if number not in self._buffers:
             self._buffers[number] = memoryview(self._load(item, number))
         return self._buffers[number]
 
-    def view(self, index: Any, what: str) -> tuple[memoryview, int | None]:
-        """The bytes of a buffer view, and its stride where it has one. What an extension compresses is decoded."""
-        item = self.at("buffer view", index, what)
+    def view(self, index: Any, label: str) -> tuple[memoryview, int | None]:
+        """Return the bytes of a buffer view, decompressed if necessary, and its stride or None."""
+        item = self.at("buffer view", index, label)
         number = int(index)
         if number not in self._views:
             stride = item.whole("byteStride") if item.has("byteStride") else None
@@ -116,75 +120,75 @@ class Document:
         return buffer.has("uri") or view.get("buffer") == 0
 
     def span(self, item: Item) -> memoryview:
-        """The bytes of a buffer that an object names by buffer, byteOffset and byteLength."""
-        data = self.buffer(item.get("buffer"), item.where)
+        """Return the bytes that an object refers to by the fields buffer, byteOffset and byteLength."""
+        data = self.buffer(item.get("buffer"), item.location)
         start, length = item.whole("byteOffset", 0), item.whole("byteLength")
         if start + length > len(data):
             raise item.error(f"it reaches beyond the end of buffer {item.get('buffer')}, which has {len(data)} bytes")
         return data[start : start + length]
 
     def numbers(
-        self, index: Any, kind: str | tuple[str, ...], what: str, count: int | None = None, finite: bool = True
+        self, index: Any, kind: str | tuple[str, ...], label: str, count: int | None = None, finite: bool = True
     ) -> Array:
-        """The rows of an accessor of a kind (a key of SHAPES), (N, columns x rows), normalised ones as -1 to 1:
-        float64, or int64 where they are whole numbers. `what` it is goes into errors.
+        """Read the N rows of an accessor whose type is `kind`, or one of several (keys of SHAPES).
 
-        Raises InputError where it is not there, is of another kind, has not `count` rows, reaches beyond its buffer or
-        holds a number that is not `finite`.
+        Returns (N, columns x rows): int64 for integers that are not normalised, else float64; normalised integers are
+        converted to -1 to 1. Raises InputError if the accessor does not exist, has another type, does not have `count`
+        rows, reaches beyond its buffer, or holds a number that is not finite although `finite` is set.
         """
-        accessor = self.at("accessor", index, what)
-        what = f"{what}: {accessor.where}"
+        accessor = self.at("accessor", index, label)
+        label = f"{label}: {accessor.location}"
         kinds = (kind,) if isinstance(kind, str) else kind
-        if (found := accessor.get("type")) not in kinds:
-            raise InputError(f"{what} must be {' or '.join(kinds)}, not {shown(found)}")
+        if (type_ := accessor.get("type")) not in kinds:
+            raise InputError(f"{label} must be {' or '.join(kinds)}, not {json_text(type_)}")
         code = accessor.whole("componentType")
         if code not in DTYPES:
             raise accessor.error(f"there is no componentType {code}")
         rows = accessor.whole("count")
         if count is not None and rows != count:
-            raise InputError(f"{what} has {rows} rows where {count} belong")
-        values = self._rows(accessor, np.dtype(DTYPES[code]), rows, SHAPES[found], what)
-        return as_floats(values, accessor.flag("normalized", False), what, finite)
+            raise InputError(f"{label} has {rows} rows instead of {count}")
+        values = self._rows(accessor, np.dtype(DTYPES[code]), rows, SHAPES[type_], label)
+        return as_floats(values, accessor.flag("normalized", False), label, finite)
 
-    def _rows(self, accessor: Item, dtype: Any, rows: int, shape: tuple[int, int], what: str) -> Array:
-        """Its rows (N, columns x rows) as they are stored."""
+    def _rows(self, accessor: Item, dtype: Any, rows: int, shape: tuple[int, int], label: str) -> Array:
+        """Read the rows of an accessor, dense or sparse, as stored: (N, columns x rows)."""
         sparse = accessor.item("sparse")
         if accessor.has("bufferView"):
-            found = self._stored(accessor, dtype, rows, shape, what)
+            values = self._stored(accessor, dtype, rows, shape, label)
         elif rows > MAX_ZEROS:
-            raise InputError(f"{what} has {rows} rows and no buffer view; at most {MAX_ZEROS} can be read")
+            raise InputError(f"{label} has {rows} rows and no buffer view; at most {MAX_ZEROS} can be read")
         else:
-            found = np.zeros((rows, shape[0] * shape[1]), dtype)
+            values = np.zeros((rows, shape[0] * shape[1]), dtype)
         if sparse is None:
-            return found
-        some = sparse.whole("count")
-        indices, values = (sparse.item(key) or Item({}, f"{sparse.where}: {key}") for key in ("indices", "values"))
-        code = indices.whole("componentType")
+            return values
+        count = sparse.whole("count")
+        places, updates = (sparse.item(key) or Item({}, f"{sparse.location}: {key}") for key in ("indices", "values"))
+        code = places.whole("componentType")
         if code not in (5121, 5123, 5125):
-            raise indices.error(f"there is no componentType {code} of indices")
-        where = self._stored(indices, np.dtype(DTYPES[code]), some, (1, 1), what)[:, 0]
-        if some and where.max() >= rows:
-            raise InputError(f"{what} sets row {where.max()} of {rows}")
-        found = found.copy()
-        found[where] = self._stored(values, dtype, some, shape, what)
-        return found
+            raise places.error(f"there is no componentType {code} for indices")
+        indices = self._stored(places, np.dtype(DTYPES[code]), count, (1, 1), label)[:, 0]
+        if count and indices.max() >= rows:
+            raise InputError(f"{label} sets row {indices.max()}, but has {rows} rows")
+        values = values.copy()
+        values[indices] = self._stored(updates, dtype, count, shape, label)
+        return values
 
-    def _stored(self, item: Item, dtype: Any, rows: int, shape: tuple[int, int], what: str) -> Array:
-        """Rows of a buffer view; the columns of a matrix begin at multiples of four bytes."""
+    def _stored(self, item: Item, dtype: Any, rows: int, shape: tuple[int, int], label: str) -> Array:
+        """Read rows from a buffer view. The columns of a matrix start at multiples of four bytes."""
         columns, width = shape
         size = dtype.itemsize
         column = width * size if columns == 1 else -(-width * size // 4) * 4
-        data, stride = self.view(item.get("bufferView"), item.where)
+        data, stride = self.view(item.get("bufferView"), item.location)
         stride, start = stride or columns * column, item.whole("byteOffset", 0)
         if stride < columns * column:
-            raise InputError(f"{what}: byteStride of buffer view {item.get('bufferView')} is less than a row")
+            raise InputError(f"{label}: byteStride of buffer view {item.get('bufferView')} is less than a row")
         if rows and start + (rows - 1) * stride + columns * column > len(data):
             view = item.get("bufferView")
-            raise InputError(f"{what} reaches beyond the end of buffer view {view}: its {rows} rows do not fit")
+            raise InputError(f"{label} reaches beyond the end of buffer view {view}: its {rows} rows do not fit")
         if not rows:
             return np.zeros((0, columns * width), dtype)
-        found = np.ndarray((rows, columns, width), dtype, data, start, (stride, column, size))
-        return found.reshape(rows, columns * width)
+        matrices = np.ndarray((rows, columns, width), dtype, data, start, (stride, column, size))
+        return matrices.reshape(rows, columns * width)
 
     def _load(self, item: Item, number: int) -> bytes:
         if not item.has("uri"):
@@ -198,15 +202,18 @@ class Document:
         except InputError as error:
             raise item.error(str(error)) from None
         except OSError as error:
-            raise item.error(f"it cannot be read ({plain(error.strerror or str(error))})") from None
+            raise item.error(f"it cannot be read ({printable(error.strerror or str(error))})") from None
 
 
-def as_floats(values: Array, normalized: bool, what: str, finite: bool = True) -> Array:
-    """Stored numbers as float64, normalised whole ones as -1 to 1; as int64 where they are whole and not normalised."""
+def as_floats(values: Array, normalized: bool, label: str, finite: bool = True) -> Array:
+    """Convert stored numbers: floats and normalised integers (-1 to 1) to float64, other integers to int64.
+
+    Raises InputError, beginning with `label`, if a number is not finite although `finite` is set.
+    """
     if values.dtype.kind == "f":
         if finite and not np.isfinite(values).all():
-            raise InputError(f"{what} holds a number that is not finite")
-        with np.errstate(invalid="ignore"):  # of a signalling NaN
+            raise InputError(f"{label} holds a number that is not finite")
+        with np.errstate(invalid="ignore"):  # signalling NaNs
             return values.astype(np.float64)
     if normalized:
         return np.maximum(values / np.iinfo(values.dtype).max, -1.0)

@@ -1,4 +1,4 @@
-"""Which extensions of glTF are read, which change nothing that is drawn, and what is said of all others."""
+"""Lists of the glTF extensions that are read or do not change the picture, and notes and errors for all others."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from wgsss.errors import InputError
 from wgsss.scene.files.gltf.compression import DRACO, MESHOPT, PACKAGES, missing
 from wgsss.scene.files.gltf.document import Document
-from wgsss.scene.files.gltf.fields import plain, shown
+from wgsss.scene.files.gltf.fields import json_text, printable
 from wgsss.scene.files.gltf.notes import Notes
 
 READ = {
@@ -33,7 +33,7 @@ READ = {
 HARMLESS = {
     "EXT_mesh_features",
     "EXT_structural_metadata",
-    "KHR_materials_emissive_strength",  # of the emission, which is noted itself
+    "KHR_materials_emissive_strength",  # scales the emission, for which there is a note
     "KHR_materials_variants",
     "KHR_node_hoverability",
     "KHR_node_selectability",
@@ -41,17 +41,17 @@ HARMLESS = {
     "KHR_xmp_json_ld",
     "MSFT_lod",
 }
-"""those that leave the picture as it is that the file shows at first"""
+"""extensions that do not change the picture of the file as it is first shown"""
 
 
 def check_required(document: Document) -> None:
-    """Raise InputError, naming them, for extensions that the file requires and that cannot be read."""
+    """Raise InputError if the file requires extensions that cannot be read; the error names them."""
     unknown = []
     for value in document.root.array("extensionsRequired"):
         if not isinstance(value, str):
-            raise InputError(f"extensionsRequired must be names, not {shown(value)}")
+            raise InputError(f"extensionsRequired must be names, not {json_text(value)}")
         if value not in READ | HARMLESS:
-            unknown.append(plain(value))
+            unknown.append(printable(value))
         elif value in PACKAGES and missing(value):
             raise InputError(missing(value))
     if unknown:
@@ -59,18 +59,18 @@ def check_required(document: Document) -> None:
 
 
 def note_unknown(document: Document, notes: Notes) -> None:
-    """Count the optional extensions that are not read, those apart that materials, textures and channels count."""
-    found: Counter[str] = Counter()
-    apart = ("materials", "textures", "animations")
-    waiting: list[Any] = [{key: value for key, value in document.root.values.items() if key not in apart}]
+    """Add notes that count optional extensions that are not read. Those of materials and animations have own notes."""
+    counts: Counter[str] = Counter()
+    noted_elsewhere = ("materials", "textures", "animations")
+    waiting: list[Any] = [{key: value for key, value in document.root.values.items() if key not in noted_elsewhere}]
     while waiting:
         value = waiting.pop()
         if isinstance(value, dict):
             extensions = value.get("extensions")
-            found.update(list(extensions) if isinstance(extensions, dict) else ())
-            waiting += [inner for key, inner in value.items() if key != "extras"]
+            counts.update(list(extensions) if isinstance(extensions, dict) else ())
+            waiting += [child for key, child in value.items() if key != "extras"]
         elif isinstance(value, list):
             waiting += value
-    for name, count in sorted(found.items()):
+    for name, count in sorted(counts.items()):
         if name not in READ | HARMLESS:
-            notes.add(f"{plain(name)} left out: used in", "place", count)
+            notes.add(f"{printable(name)} left out: used in", "place", count)

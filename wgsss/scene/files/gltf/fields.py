@@ -1,4 +1,4 @@
-"""The objects of a glTF file's JSON, read field by field: a value of a wrong type is an error that says where it is."""
+"""JSON objects of a glTF file with typed access to their fields. Errors name the location of a wrong value."""
 
 from __future__ import annotations
 
@@ -11,117 +11,121 @@ from typing import Any
 from wgsss.errors import InputError
 
 REQUIRED: Any = object()
-"""in place of a default: without the field there is an error"""
+"""in place of a default value: a missing field is an error"""
 
 
 @dataclass(frozen=True)
 class Item:
-    """A JSON object, and where it is, for messages: "mesh 0, primitive 1". A field that is null is not there.
+    """A JSON object and its location in the file. A field that is null counts as missing.
 
-    Every method raises InputError for a value of another kind than asked for.
+    Methods that read a field raise InputError if its value has the wrong type or is out of range, or if it is missing
+    and has no default.
     """
 
     values: dict[str, Any]
-    where: str = ""
+    location: str = ""
+    """location for messages, such as "mesh 0, primitive 1" """
 
     def error(self, message: str) -> InputError:
-        """An error that says where this object is."""
-        return InputError(f"{self.where}: {message}" if self.where else message)
+        """Make an error that names the location of this object."""
+        return InputError(f"{self.location}: {message}" if self.location else message)
 
     def get(self, key: str) -> Any:
-        """The value as it is; None where there is none."""
+        """Return the value of a field as it is, or None."""
         return self.values.get(key)
 
     def has(self, key: str) -> bool:
-        """Whether there is a value."""
+        """Whether the object has a field."""
         return self.values.get(key) is not None
 
     def whole(self, key: str, default: int = REQUIRED, low: int = 0, high: int = sys.maxsize) -> int:
-        """A whole number from low to high."""
+        """Read a whole number from low to high."""
         value = self._value(key, default)
         number = as_whole(value)
         if number is None or not low <= number <= high:
-            wanted = f"from {low} to {high}" if high < sys.maxsize else f"of at least {low}"
-            raise self.error(f"{key} must be a whole number {wanted}, not {shown(value)}")
+            bounds = f"from {low} to {high}" if high < sys.maxsize else f"of at least {low}"
+            raise self.error(f"{key} must be a whole number {bounds}, not {json_text(value)}")
         return number
 
     def number(self, key: str, default: float = REQUIRED, low: float = -math.inf, high: float = math.inf) -> float:
-        """A finite number from low to high."""
+        """Read a finite number from low to high."""
         value = self._value(key, default)
         number = as_number(value)
         if number is None or not low <= number <= high:
-            wanted = "a finite number" if low == -math.inf else f"at least {low:g}"
-            wanted = f"from {low:g} to {high:g}" if high < math.inf else wanted
-            raise self.error(f"{key} must be {wanted}, not {shown(value)}")
+            bounds = "a finite number" if low == -math.inf else f"at least {low:g}"
+            bounds = f"from {low:g} to {high:g}" if high < math.inf else bounds
+            raise self.error(f"{key} must be {bounds}, not {json_text(value)}")
         return number
 
     def numbers(self, key: str, count: int, default: Collection[float] = REQUIRED) -> tuple[float, ...]:
-        """So many finite numbers."""
+        """Read a list of `count` finite numbers."""
         value = self._value(key, default)
-        found = [as_number(v) for v in value] if isinstance(value, list | tuple) else []
-        if len(found) != count or None in found or not isinstance(value, list | tuple):
+        numbers = [as_number(v) for v in value] if isinstance(value, list | tuple) else []
+        if len(numbers) != count or None in numbers or not isinstance(value, list | tuple):
             raise self.error(f"{key} must be {count} finite numbers")
-        return tuple(v for v in found if v is not None)
+        return tuple(v for v in numbers if v is not None)
 
     def text(self, key: str, default: str = REQUIRED, choices: Collection[str] = ()) -> str:
-        """A text, one of some where there are choices."""
+        """Read a string. If there are choices, it must be one of them."""
         value = self._value(key, default)
         if not isinstance(value, str):
-            raise self.error(f"{key} must be text, not {shown(value)}")
+            raise self.error(f"{key} must be text, not {json_text(value)}")
         if choices and value not in choices:
-            raise self.error(f"{key} must be one of {', '.join(choices)}, not {plain(value)}")
+            raise self.error(f"{key} must be one of {', '.join(choices)}, not {printable(value)}")
         return value
 
     def flag(self, key: str, default: bool) -> bool:
-        """True or false."""
+        """Read a boolean."""
         value = self._value(key, default)
         if not isinstance(value, bool):
-            raise self.error(f"{key} must be true or false, not {shown(value)}")
+            raise self.error(f"{key} must be true or false, not {json_text(value)}")
         return value
 
     @property
     def name(self) -> str:
-        """What the object is called, "" where it has no name."""
+        """The name of the object, or "" if it has none."""
         value = self.values.get("name")
-        return plain(value) if isinstance(value, str) else ""
+        return printable(value) if isinstance(value, str) else ""
 
     def array(self, key: str) -> list[Any]:
-        """A list of whatever; empty where there is none."""
+        """Read a list of any values. Return an empty list if the field is missing."""
         value = self._value(key, [])
         if not isinstance(value, list):
-            raise self.error(f"{key} must be a list, not {shown(value)}")
+            raise self.error(f"{key} must be a list, not {json_text(value)}")
         return value
 
     def item(self, key: str, label: str = "") -> Item | None:
-        """An object; None where there is none. `label` stands for the key in messages."""
+        """Read an object. Return None if the field is missing. `label` replaces the key in messages."""
         value = self._value(key, None)
         if value is None:
             return None
         if not isinstance(value, dict):
-            raise self.error(f"{key} must be an object, not {shown(value)}")
-        where = label or key
-        return Item(value, f"{self.where}: {where}" if self.where else where)
+            raise self.error(f"{key} must be an object, not {json_text(value)}")
+        name = label or key
+        return Item(value, f"{self.location}: {name}" if self.location else name)
 
     def items(self, key: str, label: str) -> list[Item]:
-        """A list of objects; empty where there is none. One of them is called `label` and its number."""
-        found = []
+        """Read a list of objects. Return an empty list if the field is missing. Messages call them `label` 0, 1, ..."""
+        items = []
         for number, value in enumerate(self.array(key)):
-            where = f"{self.where}, {label} {number}" if self.where else f"{label} {number}"
+            location = f"{self.location}, {label} {number}" if self.location else f"{label} {number}"
             if not isinstance(value, dict):
-                raise InputError(f"{where} must be an object, not {shown(value)}")
-            found.append(Item(value, where))
-        return found
+                raise InputError(f"{location} must be an object, not {json_text(value)}")
+            items.append(Item(value, location))
+        return items
 
     def extension(self, name: str) -> Item | None:
-        """One of the object's extensions; None where it has not got it."""
-        found = self.item("extensions")
-        extension = None if found is None else found.item(name)
-        return None if extension is None else Item(extension.values, f"{self.where}: {name}" if self.where else name)
+        """Return an extension of the object by its name. Return None if the object does not have it."""
+        extensions = self.item("extensions")
+        extension = None if extensions is None else extensions.item(name)
+        return (
+            None if extension is None else Item(extension.values, f"{self.location}: {name}" if self.location else name)
+        )
 
     def extensions(self) -> list[str]:
-        """The names of the object's extensions."""
-        found = self.item("extensions")
-        return [] if found is None else [name for name in found.values if found.has(name)]
+        """Return the names of the extensions of the object."""
+        extensions = self.item("extensions")
+        return [] if extensions is None else [name for name in extensions.values if extensions.has(name)]
 
     def _value(self, key: str, default: Any) -> Any:
         value = self.values.get(key)
@@ -133,35 +137,35 @@ class Item:
 
 
 def as_whole(value: Any) -> int | None:
-    """A whole number, also if written as 3.0; None for anything else."""
+    """Convert a JSON value to an int. Accept 3.0 as well as 3; return None for anything else."""
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
 def as_number(value: Any) -> float | None:
-    """A finite number; None for anything else."""
+    """Convert a JSON value to a finite float. Return None for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     try:
         number = float(value)
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # an integer with hundreds of digits
         return None
     return number if math.isfinite(number) else None
 
 
-def shown(value: Any) -> str:
-    """A JSON value for a message, in one line of at most 60 characters."""
+def json_text(value: Any) -> str:
+    """Format a JSON value for a message, in one line of at most 60 characters."""
     if isinstance(value, dict | list):
         return "an object" if isinstance(value, dict) else "a list"
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > sys.maxsize:
         return "a number of very many digits"
     words = {True: "true", False: "false", None: "null"}
-    return words[value] if value is None or isinstance(value, bool) else plain(repr(value))
+    return words[value] if value is None or isinstance(value, bool) else printable(repr(value))
 
 
-def plain(text: str) -> str:
-    """Text of a file for a message: in one line of at most 60 characters, all of which can be printed."""
+def printable(text: str) -> str:
+    """Format text of a file for a message: one line of at most 60 printable characters."""
     text = "".join(c if c.isprintable() else " " for c in text)
     text = " ".join(text.split())
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,4 +1,4 @@
-"""The materials of a glTF file as looks: what wgsss has a use for, and notes on all else that would show."""
+"""Conversion of the materials of a glTF file to looks, with notes on visible properties that are not used."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ IOR, SPECULAR, DIFFUSE = "KHR_materials_ior", "KHR_materials_specular", "KHR_mat
 TRANSMISSION, GLOSSY = "KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness"
 
 _READ = {IOR, SPECULAR, DIFFUSE, TRANSMISSION, GLOSSY, VOLUME, SCATTER, VOLUME_SCATTER}
-_DEFAULT_ETA = 1.5  # of every glTF material that does not say otherwise
+_DEFAULT_ETA = 1.5  # the default of glTF
 _MAX_ETA = 3.0
 
 
 class Looks:
-    """The materials of a document, each read once, when a primitive first has it."""
+    """The looks of the materials of a document. Each material is read once, when a primitive first uses it."""
 
     def __init__(self, document: Document, notes: Notes) -> None:
         self._document, self._notes = document, notes
@@ -32,22 +32,25 @@ class Looks:
         self._looks: dict[int | None, Look] = {None: Look()}
 
     def of(self, primitive: Item, sets: Any) -> Look:
-        """The look of a primitive, without textures over sets of coordinates that it does not have, which is noted."""
+        """Return the look of a primitive that has the sets of texture coordinates `sets`.
+
+        Textures that need another set are left out, with a note.
+        """
         number = self._document.link(primitive, "material", "material")
         if number is not None and number not in self._looks:
             self._looks[number] = self._read(self._document.all("material")[number])
         look = self._looks[number]
         for field, texture in textures(look).items():
             if texture.coordinates not in sets:
-                what = f"{texture.name} left out, for there is no TEXCOORD_{texture.coordinates}:"
-                self._notes.add(what, "primitive")
-                without: dict[str, Any] = {field: None}
-                look = replace(look, **without)
+                loss = f"{texture.name} left out because there is no TEXCOORD_{texture.coordinates}:"
+                self._notes.add(loss, "primitive")
+                removed: dict[str, Any] = {field: None}
+                look = replace(look, **removed)
         return look
 
     def _read(self, material: Item) -> Look:
-        pbr = material.item("pbrMetallicRoughness") or Item({}, material.where)
-        normal = material.item("normalTexture") or Item({}, material.where)
+        pbr = material.item("pbrMetallicRoughness") or Item({}, material.location)
+        normal = material.item("normalTexture") or Item({}, material.location)
         color, alpha, color_map = self._base(material, pbr)
         medium = read_medium(material, self._notes)
         self._note_losses(material, pbr, medium is not None)
@@ -72,7 +75,7 @@ class Looks:
         )
 
     def _base(self, material: Item, pbr: Item) -> tuple[Triple, float, Texture | None]:
-        """The base colour, its alpha and its map."""
+        """Read the base colour, its alpha and its map."""
         glossy = material.extension(GLOSSY)
         owner, factor, texture = (pbr, "baseColorFactor", "baseColorTexture")
         if glossy is not None:
@@ -82,10 +85,11 @@ class Looks:
         return self._clipped(color), alpha, self._textures.read(owner, texture)
 
     def _boundary(self, material: Item, color: Triple, color_map: Texture | None) -> tuple[Triple, Texture | None]:
-        """The colour of a surface through which light enters a medium, and its map.
+        """Return the colour of a surface through which light enters a medium, and its map.
 
-        What diffuse transmission does not let through, the base colour reflects; both come out of the same surface
-        here. So colours are mixed where their maps are the same, and that of the larger share is taken where not.
+        glTF reflects one share of the light with the base colour, and transmits the other share with the diffuse
+        transmission colour. Here both leave the same surface. If both colours have the same map, they are mixed by
+        their shares; otherwise the colour with the larger share is used.
         """
         diffuse = material.extension(DIFFUSE)
         if diffuse is None:
@@ -99,7 +103,7 @@ class Looks:
             red, green, blue = ((1 - share) * a + share * b for a, b in zip(color, through, strict=True))
             return (red, green, blue), color_map
         if 0 < share < 1:
-            self._notes.add(f"diffuseTransmissionFactor of {DIFFUSE} taken as {round(share)}: in", "material")
+            self._notes.add(f"diffuseTransmissionFactor of {DIFFUSE} rounded to {round(share)}: used by", "material")
         return (through, through_map) if share >= 0.5 else (color, color_map)
 
     def _specular(self, material: Item) -> tuple[float | None, Texture | None]:
@@ -125,28 +129,28 @@ class Looks:
     def _clipped(self, color: Any) -> Triple:
         red, green, blue = np.clip(color, 0, 1).tolist()
         if (red, green, blue) != tuple(color):
-            self._notes.add("colours clipped to 0 to 1: of", "material")
+            self._notes.add("colours clipped to 0 to 1: used by", "material")
         return red, green, blue
 
     def _note_losses(self, material: Item, pbr: Item, medium: bool) -> None:
-        """Count what would show, and is not used."""
+        """Add notes for visible properties that are not used. `medium` says whether the material has a medium."""
         blend = material.text("alphaMode", "OPAQUE") == "BLEND"
         lost = {
             "emission left out: used by": any(material.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))),
             "occlusion textures left out: used by": material.has("occlusionTexture"),
-            "drawn as if opaque, though alpha blends:": blend,
+            "drawn opaque although alphaMode is BLEND:": blend,
             "metallic-roughness textures left out: used by": pbr.has("metallicRoughnessTexture"),
             "metal left out: used by": pbr.number("metallicFactor", 0.0) > 0,
         }
         extensions = set(material.extensions()) - HARMLESS - _READ
         if not medium:
             extensions |= {DIFFUSE, TRANSMISSION} & set(material.extensions())
-        for what, is_lost in (*lost.items(), *((f"{name} left out: used by", True) for name in sorted(extensions))):
+        for loss, is_lost in (*lost.items(), *((f"{name} left out: used by", True) for name in sorted(extensions))):
             if is_lost:
-                self._notes.add(what, "material")
+                self._notes.add(loss, "material")
 
 
 def textures(look: Look) -> dict[str, Texture]:
-    """The textures of a look by the names of its fields."""
-    found = {name: getattr(look, name) for name in ("base_color_map", "normal_map", "specular_map")}
-    return {name: texture for name, texture in found.items() if texture is not None}
+    """Return the textures of a look, by the names of its fields."""
+    fields = {name: getattr(look, name) for name in ("base_color_map", "normal_map", "specular_map")}
+    return {name: texture for name, texture in fields.items() if texture is not None}

@@ -1,4 +1,4 @@
-"""The nodes of a glTF file: their hierarchy at rest, and which of them its scene shows."""
+"""Reader of the nodes of a glTF file: their hierarchy at rest, and the nodes that the scene shows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.files.gltf.document import Document
-from wgsss.scene.files.gltf.fields import Item, as_whole, shown
+from wgsss.scene.files.gltf.fields import Item, as_whole, json_text
 from wgsss.scene.rig import Nodes, Pose
 
 Array = npt.NDArray[Any]
@@ -20,27 +20,30 @@ _UNIT = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """The nodes of a file, and what its scene shows of them."""
+class SceneNodes:
+    """The N nodes of a file, and the indices of those that its scene shows."""
 
     items: list[Item]
     nodes: Nodes
     world: Array
-    """float64 (N, 4, 4): from each node's space to that of the file, at rest; what is not finite is for `place`"""
+    """float64 (N, 4, 4): transforms from the nodes to the space of the file, at rest; `place` checks them"""
     shown: tuple[int, ...]
-    """the nodes of the scene from its roots down, hidden ones left out"""
+    """the visible nodes of the scene, from its roots down"""
     hidden: tuple[int, ...]
-    """those of the scene that KHR_node_visibility hides"""
+    """the nodes of the scene that KHR_node_visibility hides"""
 
     def place(self, node: int) -> Array:
-        """float64 (4, 4): from a node's space to that of the file. Raises InputError where it is not finite."""
+        """Return the transform (4, 4) from a node to the space of the file. Raises InputError if it is not finite."""
         if not np.isfinite(self.world[node]).all():
-            raise self.items[node].error("its place is beyond all bounds")
+            raise self.items[node].error("its transform is not finite")
         return self.world[node]
 
 
-def read_nodes(document: Document) -> Stage:
-    """The nodes of a document. Raises InputError for bad transforms, and for nodes with two parents or in a ring."""
+def read_nodes(document: Document) -> SceneNodes:
+    """Read the nodes of a document.
+
+    Raises InputError for invalid transforms, and for nodes that have two parents or are their own ancestors.
+    """
     items = document.all("node")
     children = [_children(document, item) for item in items]
     parents = np.full(len(items), -1)
@@ -51,21 +54,21 @@ def read_nodes(document: Document) -> Stage:
             parents[child] = parent
     nodes = Nodes(parents, _fixed(items), _rest(document, items))
     shown, hidden = _walk(items, children, _roots(document, parents))
-    return Stage(items, nodes, nodes.world(nodes.rest), shown, hidden)
+    return SceneNodes(items, nodes, nodes.world(nodes.rest), shown, hidden)
 
 
 def _children(document: Document, node: Item) -> list[int]:
-    found = []
+    children = []
     for value in node.array("children"):
         child = as_whole(value)
         if child is None or not 0 <= child < len(document.all("node")):
-            raise node.error(f"there is no node {shown(value)} to be its child")
-        found.append(child)
-    return found
+            raise node.error(f"its child, node {json_text(value)}, does not exist")
+        children.append(child)
+    return children
 
 
 def _roots(document: Document, parents: Array) -> list[int]:
-    """Where the scene begins that the file names, else its first; without scenes, all nodes without parents."""
+    """Return the roots of the default scene, or else of the first. Without scenes, return all nodes without parents."""
     scenes = document.all("scene")
     chosen = document.link(document.root, "scene", "scene")
     if not scenes:
@@ -73,22 +76,22 @@ def _roots(document: Document, parents: Array) -> list[int]:
     scene = scenes[chosen or 0]
     roots = []
     for value in scene.array("nodes"):
-        document.at("node", value, scene.where)
+        document.at("node", value, scene.location)
         roots.append(int(value))
     return roots
 
 
 def _walk(items: list[Item], children: list[list[int]], roots: list[int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """The nodes from the roots down, each once: those shown, and those hidden."""
+    """Walk the nodes from the roots down, each once. Return the visible nodes and the hidden ones."""
     shown: list[int] = []
     hidden: list[int] = []
-    seen: set[int] = set()
+    visited: set[int] = set()
     waiting = [(root, True) for root in reversed(roots)]
     while waiting:
         node, visible = waiting.pop()
-        if node in seen:
+        if node in visited:
             continue
-        seen.add(node)
+        visited.add(node)
         visibility = items[node].extension("KHR_node_visibility")
         visible = visible and (visibility is None or visibility.flag("visible", True))
         (shown if visible else hidden).append(node)
@@ -97,13 +100,13 @@ def _walk(items: list[Item], children: list[list[int]], roots: list[int]) -> tup
 
 
 def _fixed(items: list[Item]) -> dict[int, Array]:
-    found = {}
+    matrices = {}
     for number, item in enumerate(items):
         if item.has("matrix"):
             matrix = np.reshape(item.numbers("matrix", 16, _UNIT), (4, 4)).T
             matrix[3] = 0, 0, 0, 1
-            found[number] = matrix
-    return found
+            matrices[number] = matrix
+    return matrices
 
 
 def _rest(document: Document, items: list[Item]) -> Pose:
@@ -120,7 +123,7 @@ def _rest(document: Document, items: list[Item]) -> Pose:
 
 
 def _weights(document: Document, node: Item) -> Array:
-    """How much of each morph target of its mesh a node has at rest."""
+    """Read the weights at rest of the morph targets of the mesh of a node."""
     index = document.link(node, "mesh", "mesh")
     if index is None:
         return np.zeros(0)
@@ -129,5 +132,5 @@ def _weights(document: Document, node: Item) -> Array:
     count = len(primitives[0].array("targets")) if primitives else 0
     for item in (node, mesh):
         if item.array("weights"):
-            return np.array(Item(item.values, node.where).numbers("weights", count, ()))
+            return np.array(Item(item.values, node.location).numbers("weights", count, ()))
     return np.zeros(count)

@@ -1,4 +1,4 @@
-"""What a reader leaves out, counted: one line for each kind of loss."""
+"""Notes of a reader on data that it leaves out, with counts."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ from wgsss.scene.repair import counted
 
 
 class Notes:
-    """Losses by what is lost, each with how many things lose it."""
+    """Counted notes: one line for each kind of loss."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str], int] = {}
 
-    def add(self, what: str, unit: str = "", count: int = 1) -> None:
-        """Count a loss. The line ends in how many of the `unit` ("material") there were, where one is given."""
-        self._counts[what, unit] = self._counts.get((what, unit), 0) + count
+    def add(self, loss: str, unit: str = "", count: int = 1) -> None:
+        """Add `count` objects that are affected by a loss.
+
+        `loss` is the text of the line. If `unit` names the objects ("material"), the line ends with their total count.
+        """
+        self._counts[loss, unit] = self._counts.get((loss, unit), 0) + count
 
     def lines(self) -> tuple[str, ...]:
-        """One line for each loss, in the order in which they came."""
-        return tuple(f"{what} {counted(n, unit)}" if unit else what for (what, unit), n in self._counts.items())
+        """Return one line for each loss, in the order in which they were added."""
+        return tuple(f"{loss} {counted(n, unit)}" if unit else loss for (loss, unit), n in self._counts.items())

@@ -1,4 +1,4 @@
-"""The parts that the scene of a glTF file shows: each primitive of each mesh, wherever a node places it."""
+"""Reader of the parts of a glTF scene: one for each primitive of the mesh of each node."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wgsss.scene.files.contents import Part
 from wgsss.scene.files.gltf.document import Document
 from wgsss.scene.files.gltf.fields import Item
 from wgsss.scene.files.gltf.looks import Looks
-from wgsss.scene.files.gltf.nodes import Stage
+from wgsss.scene.files.gltf.nodes import SceneNodes
 from wgsss.scene.files.gltf.notes import Notes
 from wgsss.scene.files.gltf.primitive import Primitive, read_primitive
 from wgsss.scene.rig import turns
@@ -22,32 +22,32 @@ Array = npt.NDArray[Any]
 
 INSTANCES = "EXT_mesh_gpu_instancing"
 MAX_PARTS, MAX_FACES = 100_000, 100_000_000
-"""placed by the scene of a file: a few bytes of JSON can ask for more than any memory holds"""
+"""limits for the scene of a file: a few bytes of JSON can ask for more parts than fit into memory"""
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """A primitive where a node places it."""
+class PlacedPrimitive:
+    """A primitive at a node of the scene."""
 
     node: int
     mesh: int
     primitive: Primitive
     instance: Array | None
-    """float64 (4, 4) in the node's space, of one of its instances; None where there are none"""
+    """float64 (4, 4): transform of an instance in the space of the node; None without instances"""
     part: Part
 
 
-def read_parts(document: Document, stage: Stage, notes: Notes) -> list[Placed]:
-    """What the scene shows, in the order of its nodes.
+def read_parts(document: Document, scene: SceneNodes, notes: Notes) -> list[PlacedPrimitive]:
+    """Read the parts that the scene shows, in the order of its nodes.
 
-    The matrix of a skinned part is the identity: the joints of its skin alone say where it is.
-    Raises InputError for bad meshes and materials, and where there is no triangle at all.
+    The matrix of a skinned part is the identity, because only the joints of its skin place it. Raises InputError for
+    invalid meshes and materials, and if the scene has no triangles.
     """
     looks, meshes = Looks(document, notes), {}
-    found: list[Placed] = []
+    placed: list[PlacedPrimitive] = []
     faces = 0
-    for node in stage.shown:
-        item = stage.items[node]
+    for node in scene.shown:
+        item = scene.items[node]
         mesh = document.link(item, "mesh", "mesh")
         if mesh is None:
             continue
@@ -56,36 +56,36 @@ def read_parts(document: Document, stage: Stage, notes: Notes) -> list[Placed]:
         skinned = item.has("skin")
         for instance in [None] if skinned else _instances(document, item):
             faces += sum(len(primitive.faces) for primitive in meshes[mesh])
-            if len(found) + len(meshes[mesh]) > MAX_PARTS or faces > MAX_FACES:
-                raise InputError(f"its scene places more than {MAX_PARTS} parts or {MAX_FACES} triangles")
-            matrix = np.eye(4) if skinned else stage.place(node)
+            if len(placed) + len(meshes[mesh]) > MAX_PARTS or faces > MAX_FACES:
+                raise InputError(f"its scene has more than {MAX_PARTS} parts or {MAX_FACES} triangles")
+            matrix = np.eye(4) if skinned else scene.place(node)
             matrix = matrix if instance is None else matrix @ instance
             for primitive in meshes[mesh]:
                 look = looks.of(primitive.item, primitive.uvs)
-                found.append(Placed(node, mesh, primitive, instance, _part(primitive, look, matrix)))
-    _note_unshown(document, stage, notes)
-    if not found:
+                placed.append(PlacedPrimitive(node, mesh, primitive, instance, _part(primitive, look, matrix)))
+    _note_unshown(document, scene, notes)
+    if not placed:
         raise InputError("the mesh is empty: it has no faces" + "".join(f"; {line}" for line in notes.lines()))
-    return found
+    return placed
 
 
-def _note_unshown(document: Document, stage: Stage, notes: Notes) -> None:
-    """Count the nodes with meshes that the scene does not show, and the meshes that no node places."""
-    meshes = {node: item.get("mesh") for node, item in enumerate(stage.items) if item.has("mesh")}
-    hidden = [node for node in stage.hidden if node in meshes]
+def _note_unshown(document: Document, scene: SceneNodes, notes: Notes) -> None:
+    """Add notes that count the nodes with meshes that the scene does not show, and the meshes that no node uses."""
+    meshes = {node: item.get("mesh") for node, item in enumerate(scene.items) if item.has("mesh")}
+    hidden = [node for node in scene.hidden if node in meshes]
     if hidden:
-        notes.add("left out, for KHR_node_visibility hides them:", "node", len(hidden))
-    outside = meshes.keys() - {*stage.shown, *stage.hidden}
+        notes.add("left out because KHR_node_visibility hides them:", "node", len(hidden))
+    outside = meshes.keys() - {*scene.shown, *scene.hidden}
     if outside:
-        notes.add("left out, for the scene that is shown does not hold them:", "node", len(outside))
-    unplaced = len(document.all("mesh")) - len(set(meshes.values()))
-    if unplaced > 0:
-        notes.add("left out, for no node places them:", "mesh", unplaced)
+        notes.add("left out because the scene does not contain them:", "node", len(outside))
+    unused = len(document.all("mesh")) - len(set(meshes.values()))
+    if unused > 0:
+        notes.add("left out because no node uses them:", "mesh", unused)
 
 
 def _part(primitive: Primitive, look: Any, matrix: Array) -> Part:
     return Part(
-        primitive.item.where,
+        primitive.item.location,
         primitive.positions,
         primitive.faces,
         look,
@@ -102,7 +102,7 @@ def _primitives(document: Document, mesh: Item, notes: Notes) -> list[Primitive]
 
 
 def _instances(document: Document, node: Item) -> list[Array | None]:
-    """The places (4, 4) in its space of the instances of a node; None alone where it has none."""
+    """Read the transforms (4, 4) of the instances of a node, in its space. Return [None] if it has no instances."""
     extension = node.extension(INSTANCES)
     if extension is None:
         return [None]
@@ -111,7 +111,7 @@ def _instances(document: Document, node: Item) -> list[Array | None]:
     rows, count = {}, None
     for name, kind in kinds.items():
         if attributes.has(name):
-            rows[name] = document.numbers(attributes.get(name), kind, f"{extension.where}: {name}", count)
+            rows[name] = document.numbers(attributes.get(name), kind, f"{extension.location}: {name}", count)
             count = len(rows[name])
     if count is None:
         return [None]

@@ -1,4 +1,4 @@
-"""The primitives of a glTF mesh as triangles: what they have at their vertices, checked and in plain arrays."""
+"""Reader of the primitives of a glTF mesh: triangles and their vertex attributes as checked arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wgsss.scene.files.gltf.attributes import FAN, TRIANGLES, Attributes
 from wgsss.scene.files.gltf.document import Document
-from wgsss.scene.files.gltf.fields import Item, plain
+from wgsss.scene.files.gltf.fields import Item, printable
 from wgsss.scene.files.gltf.notes import Notes
 
 Array = npt.NDArray[Any]
@@ -27,9 +27,9 @@ class Primitive:
     item: Item
     attributes: Attributes
     vertices: int
-    """how many the file has"""
-    kept: Array | None
-    """int (V,): which of them are kept, where few are used; None for all"""
+    """number of vertices in the file"""
+    selection: Array | None
+    """int (V,): the vertices that faces use, if these are less than half of all; None for all vertices"""
     positions: Array
     """float64 (V, 3)"""
     faces: Array
@@ -37,21 +37,24 @@ class Primitive:
     normals: Array | None
     """float64 (V, 3), of any length"""
     uvs: dict[int, Array]
-    """float64 (V, 2) by number of the set"""
+    """float64 (V, 2) for each number of a set"""
     colors: Array | None
-    """float64 (V, 3), 0 to 1; None also where they are all white"""
+    """float64 (V, 3), 0 to 1; None if there are none or all are white"""
 
     def read(self, name: str, kind: str | tuple[str, ...]) -> Array:
-        """A further attribute (V, C) of the vertices that are kept."""
-        return self.pick(self.attributes.read(name, kind, self.vertices))
+        """Read a further attribute (V, C) of the selected vertices."""
+        return self.select(self.attributes.read(name, kind, self.vertices))
 
-    def pick(self, values: Array) -> Array:
-        """Of values of all vertices those that are kept."""
-        return values if self.kept is None else values[self.kept]
+    def select(self, values: Array) -> Array:
+        """Return the values of the selected vertices, given those of all vertices."""
+        return values if self.selection is None else values[self.selection]
 
 
 def read_primitive(document: Document, item: Item, notes: Notes) -> Primitive | None:
-    """A primitive; None where it has no triangles, which is noted. Raises InputError, naming it, for bad data."""
+    """Read a primitive. Return None, with a note, if it has no triangles.
+
+    Raises InputError, naming the primitive, for invalid data.
+    """
     mode = item.whole("mode", TRIANGLES, high=FAN)
     attributes = Attributes(document, item)
     if mode in _NOT_DRAWN or "POSITION" not in attributes.names:
@@ -61,23 +64,23 @@ def read_primitive(document: Document, item: Item, notes: Notes) -> Primitive | 
     faces = attributes.faces(len(positions), notes)
     if not len(faces):
         return None
-    vertices, kept = len(positions), None
+    vertices, selection = len(positions), None
     used = np.zeros(vertices, bool)
     used[faces] = True
-    if 2 * used.sum() < vertices:  # one of many primitives that share the rows of their accessors
-        kept = np.flatnonzero(used)
-        positions, faces = positions[kept], np.searchsorted(kept, faces)
+    if 2 * used.sum() < vertices:  # the primitive shares its accessors with other primitives
+        selection = np.flatnonzero(used)
+        positions, faces = positions[selection], np.searchsorted(selection, faces)
 
     def rows(name: str, kind: str | tuple[str, ...]) -> Array:
         values = attributes.read(name, kind, vertices, finite=False)
-        return values if kept is None else values[kept]
+        return values if selection is None else values[selection]
 
     for name in attributes.names:
         if name.startswith("_"):
-            notes.add(f"attribute {plain(name)} left out:", "primitive")
+            notes.add(f"attribute {printable(name)} left out:", "primitive")
     normals, uvs = _normals(attributes, rows, notes), _uvs(attributes, rows, notes)
     colors = _colors(attributes, rows, notes)
-    return Primitive(item, attributes, vertices, kept, positions, faces, normals, uvs, colors)
+    return Primitive(item, attributes, vertices, selection, positions, faces, normals, uvs, colors)
 
 
 def _normals(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
@@ -86,27 +89,28 @@ def _normals(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
     normals = rows("NORMAL", "VEC3").astype(np.float64)
     bad = ~np.isfinite(normals).all(axis=1)
     if bad.any():
-        notes.add(f"normals that are not finite left out in {attributes.where}:", "vertex", int(bad.sum()))
+        notes.add(f"normals that are not finite left out in {attributes.location}:", "vertex", int(bad.sum()))
         normals[bad] = 0
     return normals
 
 
 def _uvs(attributes: Attributes, rows: Rows, notes: Notes) -> dict[int, Array]:
-    found = {}
+    sets = {}
     for number in attributes.numbered("TEXCOORD"):
         uvs = rows(f"TEXCOORD_{number}", "VEC2").astype(np.float64)
         bad = int((~np.isfinite(uvs)).any(axis=1).sum())
         if bad:
-            what = f"TEXCOORD_{number} of {attributes.where} left out, not finite at"
-            notes.add(what, "vertex", bad)
+            notes.add(f"TEXCOORD_{number} of {attributes.location} left out, not finite at", "vertex", bad)
         else:
-            found[number] = uvs
-    return found
+            sets[number] = uvs
+    return sets
 
 
 def _colors(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
-    """The first set of vertex colours. Whole numbers are shares of their largest value even if the file forgot to say
-    so."""
+    """Read the first set of vertex colours (V, 3), or None.
+
+    Integer colours are divided by the largest value of their type even if the accessor is not marked as normalised.
+    """
     sets = attributes.numbered("COLOR")
     if any(number > 0 for number in sets):
         notes.add("vertex colours beyond COLOR_0 left out:", "primitive")
@@ -117,7 +121,7 @@ def _colors(attributes: Attributes, rows: Rows, notes: Notes) -> Array | None:
         colors = colors / (255 if colors.max() <= 255 else 65535)
     bad = int((~np.isfinite(colors)).any(axis=1).sum())
     if bad:
-        notes.add(f"COLOR_0 of {attributes.where} left out, not finite at", "vertex", bad)
+        notes.add(f"COLOR_0 of {attributes.location} left out, not finite at", "vertex", bad)
         return None
     colors = np.clip(colors, 0, 1)
     if colors.shape[1] == 4 and (colors[:, 3] < 1).any():

@@ -1,4 +1,4 @@
-"""Putting a .glb file together: its JSON, and the numbers and images in its one buffer."""
+"""Writer of .glb files: the JSON, and one buffer with numbers and images."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
 class Writer:
-    """A glTF file that grows. What is added gives back the number by which the file refers to it."""
+    """A glTF file under construction. Methods that add an object return its index in the file."""
 
     def __init__(self, generator: str) -> None:
         self._tree: dict[str, Any] = {"asset": {"version": "2.0", "generator": generator}}
         self._data = bytearray()
         self._extensions: dict[str, Any] = {}
 
-    def add(self, collection: str, thing: dict[str, Any]) -> int:
-        """Add to a list of the file, such as "nodes"."""
-        things = self._tree.setdefault(collection, [])
-        things.append(thing)
-        return len(things) - 1
+    def add(self, collection: str, item: dict[str, Any]) -> int:
+        """Add an object to a collection of the file, such as "nodes"."""
+        items = self._tree.setdefault(collection, [])
+        items.append(item)
+        return len(items) - 1
 
     def extended(self, name: str, values: dict[str, Any]) -> dict[str, Any]:
-        """An extension's values by its name, which the file then says it uses."""
+        """Return the field of an extension for an object, and add the extension to those that the file uses."""
         self._extensions.setdefault(name, None)
         return {name: values}
 
     def put(self, name: str, values: dict[str, Any]) -> None:
-        """Give the file itself an extension."""
+        """Set an extension of the root object of the file."""
         self._extensions[name] = values
 
     def rows(self, values: Array, *, bounds: bool = False) -> int:
-        """An accessor of float32 or uint32 (N, C), with the least and the greatest of each column on request."""
+        """Add an accessor of float32 or uint32 values (N, C), with `bounds` also the bounds of each column."""
         array = np.ascontiguousarray(values)
         accessor = {
             "bufferView": self._view(array.astype(array.dtype.newbyteorder("<")).tobytes()),
@@ -52,7 +52,7 @@ class Writer:
         return self.add("accessors", accessor)
 
     def texture(self, pixels: Array, sampler: int) -> dict[str, Any]:
-        """A texture of uint8 (H, W, 3 or 4), as a material refers to it."""
+        """Add a texture of pixels uint8 (H, W, 3 or 4). Return the object by which a material refers to it."""
         from PIL import Image
 
         file = io.BytesIO()
@@ -61,15 +61,15 @@ class Writer:
         return {"index": self.add("textures", {"source": image, "sampler": sampler})}
 
     def glb(self, nodes: list[int]) -> bytes:
-        """The file, its scene being these nodes."""
+        """Return the bytes of the file, with a scene of these root nodes."""
         tree = self._tree | {"scene": 0, "scenes": [{"nodes": nodes}]}
         if self._data:
             tree["buffers"] = [{"byteLength": len(self._data)}]
         if self._extensions:
             tree["extensionsUsed"] = sorted(self._extensions)
-        own = {name: values for name, values in self._extensions.items() if values is not None}
-        if own:
-            tree["extensions"] = own
+        root_extensions = {name: values for name, values in self._extensions.items() if values is not None}
+        if root_extensions:
+            tree["extensions"] = root_extensions
         text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
         chunks = _chunk(b"JSON", text, b" ") + (_chunk(b"BIN\0", bytes(self._data), b"\0") if self._data else b"")
         return b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunks)).to_bytes(4, "little") + chunks

@@ -1,4 +1,4 @@
-"""The faces of OBJ files: which vertex, texture coordinate and normal each corner has."""
+"""The faces of OBJ files: the vertex, texture coordinate and normal of each corner."""
 
 from __future__ import annotations
 
@@ -8,27 +8,31 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.scene.files.text import Text, shown
+from wgsss.scene.files.text import Text, printable
 
 Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
 class Faces:
-    """Faces whose corners (C,) follow one another; what a corner has is an index from 0, or -1 where it has none."""
+    """F faces with C corners in total, face after face."""
 
     counts: Array
-    """int64 (F,): the corners of each face"""
+    """int64 (F,): the number of corners of each face"""
     vertex: Array
+    """int64 (C,): the index of the vertex of each corner"""
     uv: Array
+    """int64 (C,): the index of the texture coordinate, or -1 if the corner has none"""
     normal: Array
+    """int64 (C,): the index of the normal, or -1 if the corner has none"""
 
 
 def read_faces(text: Text, rows: Array, vertices: Array, uvs: Array, normals: Array) -> Faces:
-    """The faces that stand in some rows, given the rows of all vertices, texture coordinates and normals.
+    """Read the faces in some rows, given the rows of all vertices, texture coordinates and normals.
 
-    A corner is "v", "v/vt", "v//vn" or "v/vt/vn". Raises InputError, naming the line, where it is none of these, or a
-    number is 0 or beyond what there is. A negative number counts back from the last that stands before the face.
+    A corner is "v", "v/vt", "v//vn" or "v/vt/vn". A negative number counts back from the last vertex, texture
+    coordinate or normal before the face. Raises InputError, naming the line, if a corner has another form, or if a
+    number is 0 or out of range.
     """
     counts = text.widths[rows] - 1
     first = text.first[rows] + 1 - (np.cumsum(counts) - counts)
@@ -39,16 +43,16 @@ def read_faces(text: Text, rows: Array, vertices: Array, uvs: Array, normals: Ar
     at = np.cumsum(fields) - fields
     row = np.repeat(rows, counts)
 
-    def index(has: Array, place: Array, named: Array, what: str) -> Array:
-        """The indices of corners that have one, given the rows of what they name."""
-        number = numbers[place[has]]
-        found = np.where(number > 0, number - 1, np.searchsorted(named, row[has]) + number)
-        bad = np.flatnonzero((number == 0) | (found < 0) | (found >= len(named)))
+    def index(has: Array, offset: Array, targets: Array, noun: str) -> Array:
+        """Return indices (C,) into the rows `targets`, -1 for corners without. `has` (C,) says which have one."""
+        number = numbers[offset[has]]
+        indices = np.where(number > 0, number - 1, np.searchsorted(targets, row[has]) + number)
+        bad = np.flatnonzero((number == 0) | (indices < 0) | (indices >= len(targets)))
         if len(bad):
             word = words[has][bad[0]]
-            raise text.error(word, f"{what} {number[bad[0]]} does not exist (the file has {len(named)})")
+            raise text.error(word, f"{noun} {number[bad[0]]} does not exist (the file has {len(targets)})")
         result = np.full(len(words), -1)
-        result[has] = found
+        result[has] = indices
         return result
 
     return Faces(
@@ -60,7 +64,7 @@ def read_faces(text: Text, rows: Array, vertices: Array, uvs: Array, normals: Ar
 
 
 def _fields(text: Text, words: Array) -> tuple[Array, Array]:
-    """Which of the corners name a texture coordinate and which a normal, bool (C,)."""
+    """Return whether each corner has a texture coordinate, and whether it has a normal, both bool (C,)."""
     starts, ends = text.starts[words], text.ends[words]
     slashes = np.flatnonzero(text.codes == ord("/"))
     before = np.searchsorted(slashes, starts)
@@ -68,7 +72,7 @@ def _fields(text: Text, words: Array) -> tuple[Array, Array]:
     bad = np.flatnonzero((count > 2) | (text.codes[starts] == ord("/")))
     if len(bad):
         word = words[bad[0]]
-        raise text.error(word, f"'{shown(text.word(word))}' is not a corner of a face")
+        raise text.error(word, f"'{printable(text.word(word))}' is not a corner of a face")
     has_uv, has_normal = count > 0, count == 2
     # Some programs leave the last fields empty: "1/" and "1//".
     after_slash = slashes[before[has_uv]] + 1

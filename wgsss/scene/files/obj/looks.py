@@ -1,4 +1,4 @@
-"""The materials of OBJ files: which .mtl files are named, and which of their materials each face has."""
+"""The materials of OBJ files: the .mtl files that a file names, and the material of each face."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from wgsss.errors import InputError
 from wgsss.scene.files.contents import Look
 from wgsss.scene.files.locate import locate
 from wgsss.scene.files.obj.mtl import read_materials
-from wgsss.scene.files.text import Text, shown, without_comment
+from wgsss.scene.files.text import Text, printable, without_comment
 
 Array = npt.NDArray[Any]
 
 
 def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: list[str]) -> tuple[list[Look], Array]:
-    """Looks, and which of them each face has (F,), given the rows of mtllib, usemtl and faces.
+    """Read the looks of a file, and the index of the look of each face (F,), given the rows of mtllib, usemtl and f.
 
-    A note names each .mtl file that is not there, or else the materials that none describes; their looks are plain.
+    A material that no .mtl file describes gets a default look. A note names each .mtl file that does not exist; if all
+    exist, a note names the materials that are not described.
     """
     looks: dict[str, Look] = {}
     missing: list[str] = []
@@ -32,7 +33,7 @@ def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: l
             except InputError as error:
                 notes.append(f"materials left out: {error}")
                 continue
-            looks = {**more_looks, **looks}  # of two with one name the first counts
+            looks = {**more_looks, **looks}  # of two with the same name, the first is used
             notes += more_notes
     by_short_name = {without_comment(name): look for name, look in looks.items()}
 
@@ -40,11 +41,11 @@ def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: l
     of_name: dict[str, Look] = {}
     unknown = []
     for name in dict.fromkeys(names):
-        found = looks.get(name) or by_short_name.get(without_comment(name))
-        if found is None:
-            unknown.append(shown(name))
-        of_name[name] = found or Look(without_comment(name))
-    notes += [f"the material file '{shown(name)}' is not there" for name in missing]
+        look = looks.get(name) or by_short_name.get(without_comment(name))
+        if look is None:
+            unknown.append(printable(name))
+        of_name[name] = look or Look(without_comment(name))
+    notes += [f"the material file '{printable(name)}' does not exist" for name in missing]
     if unknown and not missing:
         listed = ", ".join(unknown[:3]) + (f" and {len(unknown) - 3} more" if len(unknown) > 3 else "")
         notes.append(f"no .mtl file describes material{'s' * (len(unknown) > 1)} {listed}")
@@ -54,9 +55,9 @@ def read_looks(text: Text, libraries: Array, uses: Array, faces: Array, notes: l
 
 
 def _files(names: str, folder: Path, missing: list[str]) -> list[Path]:
-    """The files that a mtllib statement names: one, whose name may hold blanks, or several."""
-    for whole in (names, without_comment(names)):
-        file = locate(whole.strip('"'), folder)
+    """Return the files that a mtllib statement names: one file whose name may contain blanks, or several files."""
+    for name in (names, without_comment(names)):
+        file = locate(name.strip('"'), folder)
         if file:
             return [file]
     names = without_comment(names)

@@ -1,7 +1,7 @@
-"""Materials of OBJ files (.mtl): the colour, textures and index of refraction that wgsss has a use for.
+"""Reader of the materials of OBJ files (.mtl): colour, textures, roughness and index of refraction.
 
 Sources: Wavefront's "MTL material format" (Ramey, Rose, Tyerman, 1995) and Clara.io's extension of it for
-physically-based materials (norm, Pr, Pm). Colours are taken to be linear, as Blender writes them.
+physically-based materials (norm, Pr, Pm). Colours are read as linear, as Blender writes them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 from wgsss.errors import InputError
 from wgsss.scene.files.contents import Look, Texture, Triple
 from wgsss.scene.files.obj.mtl_texture import MapStatement
-from wgsss.scene.files.text import decoded, file_bytes, shown, without_comment
+from wgsss.scene.files.text import decoded, file_bytes, printable, without_comment
 
-# Statements that name an image and have no use here, beside all others that start with "map_".
+# Statements that name an image and are not used, in addition to those that start with "map_".
 _OTHER_MAPS = ("bump", "disp", "decal", "refl")
 _HEIGHT_MAPS = ("bump", "map_bump")
-# Numbers that have no use here: what they are, and what they are where they change nothing.
+# Numbers that are not used: their names in notes, and the values that change nothing.
 _UNUSED = {
     "ke": ("emission (Ke)", 0.0),
     "tf": ("transmission filter (Tf)", 1.0),
@@ -30,9 +30,10 @@ _UNUSED = {
 
 
 def read_materials(path: Path) -> tuple[dict[str, Look], list[str]]:
-    """The materials of a file by name, and notes on what of them is left out. A damaged line is a note as well.
+    """Read the materials of a file, by name.
 
-    Raises InputError where the file cannot be read or is not text.
+    Returns also notes on statements that are left out, including damaged lines. Raises InputError if the file cannot be
+    read or is not text.
     """
     data = file_bytes(path)
     if b"\0" in data:
@@ -46,40 +47,42 @@ def read_materials(path: Path) -> tuple[dict[str, Look], list[str]]:
         if keyword.lower() == "newmtl":
             current = _Material(value, path.parent, notes)
             if materials.setdefault(value, current) is not current:
-                notes.add(value, "it is defined more than once, and the first counts")
+                notes.add(value, "it is defined more than once, and the first definition is used")
         elif keyword and not keyword.startswith("#"):
             current.statements[keyword.lower()] = value
     return {name: material.look() for name, material in materials.items()}, notes.lines()
 
 
 class _Notes:
-    """Notes on materials: one line for each kind, whatever the number of materials."""
+    """Notes on materials, collected so that equal notes of several materials become one line."""
 
     def __init__(self) -> None:
         self._materials: dict[str, dict[str, None]] = {}
 
-    def add(self, material: str, what: str) -> None:
-        self._materials.setdefault(what, {})[material] = None
+    def add(self, material: str, note: str) -> None:
+        self._materials.setdefault(note, {})[material] = None
 
     def lines(self) -> list[str]:
-        return [f"{_listed(list(materials))}: {what}" for what, materials in self._materials.items()]
+        return [f"{_listed(list(materials))}: {note}" for note, materials in self._materials.items()]
 
 
 def _listed(materials: list[str]) -> str:
     more = f" and {len(materials) - 3} more" if len(materials) > 3 else ""
-    return f"material{'s' * (len(materials) > 1)} {', '.join(map(shown, materials[:3]))}{more}"
+    return f"material{'s' * (len(materials) > 1)} {', '.join(map(printable, materials[:3]))}{more}"
 
 
 @dataclass
 class _Material:
-    """The statements of one material, by keyword in lower case."""
+    """The statements of one material."""
 
     name: str
     folder: Path
     notes: _Notes
     statements: dict[str, str] = field(default_factory=dict)
+    """the text after each keyword, by keyword in lower case"""
 
     def look(self) -> Look:
+        """Return the look of the material, and add notes on statements that are not used."""
         base_color_map = self._texture("map_kd")
         normal = "norm" if "norm" in self.statements else "map_kn"
         specular_map, normal_map = self._texture("map_ks", "L"), self._texture(normal)
@@ -99,13 +102,13 @@ class _Material:
         self._note_unused({"map_kd", "map_ks", normal} | ({"map_d"} if cutoff else set()))
         return look
 
-    def _note(self, what: str) -> None:
-        self.notes.add(self.name, what)
+    def _note(self, note: str) -> None:
+        self.notes.add(self.name, note)
 
     def _numbers(self, keyword: str, default: float) -> Triple:
-        """The three numbers of a statement, one standing for all three."""
+        """Return the three numbers of a statement. A single number is repeated."""
         words = without_comment(self.statements.get(keyword, "")).split()
-        if words[:1] == ["-halo"]:  # of `d`: less opaque where the surface faces the camera
+        if words[:1] == ["-halo"]:  # an option of `d`: less opaque where the surface faces the camera
             del words[0]
         try:
             r, g, b = map(float, words * 3 if len(words) == 1 else words[:3])
@@ -114,16 +117,16 @@ class _Material:
         except ValueError:
             pass
         if keyword in self.statements:
-            self._note(f"'{keyword} {shown(self.statements[keyword])}' is not understood, and left out")
+            self._note(f"'{keyword} {printable(self.statements[keyword])}' is not understood and is left out")
         return default, default, default
 
     def _base_color(self, texture: Texture | None) -> Triple:
-        given = self._numbers("kd", 1.0)
-        r, g, b = (min(max(value, 0.0), 1.0) for value in given)
-        if (r, g, b) != given:
-            self._note("Kd is not within 0 to 1, and is clipped")
+        color = self._numbers("kd", 1.0)
+        r, g, b = (min(max(value, 0.0), 1.0) for value in color)
+        if (r, g, b) != color:
+            self._note("Kd is outside 0 to 1 and is clipped")
         if texture and r == g == b == 0:
-            self._note("Kd 0 0 0 would make its texture black, and is taken as 1 1 1")
+            self._note("Kd 0 0 0 would make its texture black and is replaced by 1 1 1")
             return 1.0, 1.0, 1.0
         return r, g, b
 
@@ -136,26 +139,26 @@ class _Material:
         statement = MapStatement.parse(self.statements[keyword])
         file = statement.locate(self.folder)
         if file is None:
-            self._note(f"the texture '{shown(statement.name)}' ({keyword}) is not there, and left out")
+            self._note(f"the texture '{printable(statement.name)}' ({keyword}) does not exist and is left out")
             return None
         for option in statement.unused():
-            self._note(f"the option {shown(option)} of {keyword} is ignored")
+            self._note(f"the option {printable(option)} of {keyword} is ignored")
         return statement.texture(file, channels)
 
     def _note_unused(self, used_maps: set[str]) -> None:
         if "map_d" not in used_maps and (self._numbers("d", 1.0)[0] < 1 or self._numbers("tr", 0.0)[0] > 0):
-            self._note("transparency (d, Tr) is left out, it is drawn opaque")
+            self._note("transparency (d, Tr) is left out: the material is drawn opaque")
         if any(self._numbers("ks", 0.0)):
             self._note("Phong highlights (Ks, Ns) are left out")
-        for keyword, (what, neutral) in _UNUSED.items():
+        for keyword, (name, neutral) in _UNUSED.items():
             if self._numbers(keyword, neutral) != (neutral,) * 3:
-                self._note(f"{what} is left out")
+                self._note(f"{name} is left out")
         for keyword, value in self.statements.items():
             if keyword in used_maps or not (keyword.startswith("map_") or keyword in _OTHER_MAPS):
                 continue
             if keyword == "map_ka" and self._file("map_ka") == self._file("map_kd"):
-                continue  # the ambient colour is not asked for, and most programs repeat the diffuse one there
-            file = f"'{shown(MapStatement.parse(value).name)}' ({keyword})"
+                continue  # most programs repeat the diffuse map as the ambient map, which is not used
+            file = f"'{printable(MapStatement.parse(value).name)}' ({keyword})"
             if keyword in _HEIGHT_MAPS:
                 self._note(f"the height map {file} is left out (if it holds normals, name it by 'norm')")
             else:

@@ -1,4 +1,4 @@
-"""Texture statements of .mtl files: options, then the name of an image file."""
+"""Texture statements of .mtl files, which consist of options and the name of an image file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wgsss.scene.files.locate import locate
 from wgsss.scene.files.text import without_comment
 
 _NUMBER = r"[-+]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})(?:[eE][-+]?\d{1,2})?(?!\S)"  # not too large for a float
-# Options stand before the file name, though some programs write them after it.
+# Options belong before the file name, but some programs write them after it.
 _OPTION = re.compile(
     rf"(?<!\S)-(?:(?P<vector>o|s|t)(?P<numbers>(?:\s+{_NUMBER}){{1,3}})"
     rf"|(?P<pair>mm)(?P<two>\s+{_NUMBER}\s+{_NUMBER})"
@@ -20,7 +20,7 @@ _OPTION = re.compile(
     r"|(?P<switch>blendu|blendv|cc|clamp|imfchan|type|colorspace)(?P<word>\s+\S+))",
     re.IGNORECASE,
 )
-# Options that change the picture and are not used, and their values that change nothing.
+# Options that change the picture and are not supported, with those of their values that change nothing.
 _UNUSED = {
     "t": ("0", "0 0", "0 0 0"),
     "mm": ("0 1",),
@@ -33,44 +33,46 @@ _UNUSED = {
 
 @dataclass(frozen=True)
 class MapStatement:
-    """A texture statement taken apart."""
+    """A parsed texture statement."""
 
     name: str
-    """of the file, as it is written"""
+    """name of the file as it is written"""
     options: dict[str, tuple[str, ...]]
-    """their words, by name without the dash"""
+    """arguments of each option, by its name without the dash"""
 
     @classmethod
     def parse(cls, text: str) -> MapStatement:
+        """Split the text of a statement into options and the name of the file."""
         options: dict[str, tuple[str, ...]] = {}
 
-        def take(found: re.Match[str]) -> str:
-            name, words = (word for word in found.groups() if word is not None)
+        def take(match: re.Match[str]) -> str:
+            name, words = (word for word in match.groups() if word is not None)
             options[name.lower()] = tuple(words.split())
             return " "
 
         return cls(_OPTION.sub(take, text).strip().strip('"'), options)
 
     def locate(self, folder: Path) -> Path | None:
-        """The file that is named; a '#' in its name is tried as such first, then as the start of a comment."""
+        """Find the file. A '#' is first taken as part of its name, then as the start of a comment."""
         return locate(self.name, folder) or locate(without_comment(self.name).strip('"'), folder)
 
     def texture(self, file: Path, channels: str) -> Texture:
-        """The texture of a file, with what the options say of where it lies."""
+        """Return the texture of an image file, with the placement and the wrapping that the options define."""
         wrap = "clamp" if self.options.get("clamp") == ("on",) else "repeat"
         return Texture(file, file.name, channels, transform=self._transform(), wrap=(wrap, wrap))
 
     def number(self, option: str, default: float) -> float:
+        """Return the first argument of an option, or the default if the option is missing."""
         return float(self.options[option][0]) if option in self.options else default
 
     def unused(self) -> Iterator[str]:
-        """Options that change the picture and are not used, as they are written."""
+        """Yield the options that change the picture and are not supported, as they are written."""
         for name, words in self.options.items():
             if name in _UNUSED and " ".join(words).lower() not in _UNUSED[name]:
                 yield f"-{name} {' '.join(words)}"
 
     def _transform(self) -> tuple[Triple, Triple] | None:
-        """With v up, coordinates are scaled by -s and shifted by -o; the same with v down, or None for neither."""
+        """Return the matrix of the options -s (scale) and -o (offset), converted from v up to v down, or None."""
         if not {"s", "o"} & set(self.options):
             return None
         u_scale, v_scale = _pair(self.options.get("s", ()), 1.0)

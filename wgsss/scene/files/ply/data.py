@@ -1,4 +1,4 @@
-"""The numbers of PLY files as a table for each element, whatever the elements mean."""
+"""The body of PLY files: one table of numbers for each element, without interpretation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.files.ply.header import Element, Header
-from wgsss.scene.files.text import Text, shown
+from wgsss.scene.files.text import Text, printable
 
 Array = npt.NDArray[Any]
 
@@ -22,20 +22,23 @@ _STRUCT = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I"}
 
 @dataclass(frozen=True)
 class Lists:
-    """A list for each row: how long each is, int64 (N,), and the values of all, one after the other."""
+    """One list for each of N rows."""
 
     counts: Array
+    """int64 (N,): the lengths of the lists"""
     values: Array
+    """(sum of counts,): the values of all lists in a row"""
 
 
 Table = dict[str, Array | Lists]
 
 
 def read_tables(path: Path, data: bytes, header: Header, notes: list[str]) -> dict[str, Table]:
-    """The rows of each element by its name; of two with one name the first counts, and so of properties.
+    """Read the rows of each element, by its name.
 
-    Numbers are float64 in an ASCII file, and of their own types in a binary one. Raises InputError, naming the line or
-    the element, where the file is damaged or truncated.
+    Of two elements or properties with the same name, the first is used. Numbers are float64 for an ASCII file and have
+    the types of the header for a binary one. Raises InputError, naming the line or the element, if the file is damaged
+    or truncated.
     """
     tables: dict[str, Table] = {}
     rows = (_binary if header.order else _ascii)(path, data, header, notes)
@@ -59,7 +62,9 @@ def _ascii(path: Path, data: bytes, header: Header, notes: list[str]) -> Iterato
 
         table, misfit = _table(element, edges - edges[0], take, lambda _: 1)
         if misfit is not None:
-            raise text.error(edges[misfit], f"its numbers do not fit the properties of element {shown(element.name)}")
+            raise text.error(
+                edges[misfit], f"its numbers do not fit the properties of element {printable(element.name)}"
+            )
         yield table
         row += count
     if row < len(text.widths):
@@ -76,7 +81,7 @@ def _binary(path: Path, data: bytes, header: Header, notes: list[str]) -> Iterat
         edges = _edges(path, data, at, element, header.order)
         table, misfit = _table(element, edges, take, _size)
         if misfit is not None:
-            raise InputError(f"{path}: damaged: row {misfit + 1} of element {shown(element.name)}")
+            raise InputError(f"{path}: damaged: row {misfit + 1} of element {printable(element.name)}")
         yield table
         at = int(edges[-1])
     if data[at:].strip():
@@ -88,20 +93,22 @@ def _size(type_: str) -> int:
 
 
 def _numbers(data: bytes, type_: str) -> Array:
-    """A view of the data in which a number starts at every byte."""
+    """Return an overlapping view of the data with a number that starts at each byte."""
     return np.ndarray((max(len(data) - _size(type_) + 1, 0),), type_, data, strides=(1,))
 
 
 def _truncated(path: Path, element: Element) -> InputError:
-    return InputError(f"{path}: truncated: it has fewer than {element.count} rows of element {shown(element.name)}")
+    return InputError(f"{path}: truncated: it has fewer than {element.count} rows of element {printable(element.name)}")
 
 
 def _table(
     element: Element, edges: Array, take: Callable[[Array, str], Array], size: Callable[[str], int]
 ) -> tuple[Table, int | None]:
-    """The properties of rows that lie between `edges` (N + 1,), and the first row whose properties do not fill it.
+    """Read the properties of N rows, where row i lies between edges[i] and edges[i + 1].
 
-    `take` gives the numbers of a type at some places, and `size` how many places one takes up.
+    Edges count words in an ASCII file and bytes in a binary one. `take` returns the numbers of a type at some offsets,
+    and `size` returns the size of a number of a type. Returns the table, and the first row that its properties do not
+    fill exactly, or None.
     """
     table: Table = {}
     at, ends = edges[:-1], edges[1:]
@@ -119,8 +126,8 @@ def _table(
                 return {}, int(misfit.argmax())
             counts = counts.astype(np.int64)
             before = np.cumsum(counts) - counts
-            places = np.repeat(at - each * before, counts) + each * np.arange(counts.sum())
-            value = Lists(counts, take(places, p.type))
+            offsets = np.repeat(at - each * before, counts) + each * np.arange(counts.sum())
+            value = Lists(counts, take(offsets, p.type))
             at = at + each * counts
         table.setdefault(p.name, value)
     misfit = at != ends
@@ -128,7 +135,7 @@ def _table(
 
 
 def _edges(path: Path, data: bytes, at: int, element: Element, order: str) -> Array:
-    """Where the rows of an element of a binary file start, and where the last one ends, int64 (N + 1,)."""
+    """Return the byte offsets of the N rows of a binary element, and the end of the last row: int64 (N + 1,)."""
     least = sum(_size(p.length or p.type) for p in element.properties)
     if element.count * least > len(data) - at:
         raise _truncated(path, element)
@@ -139,21 +146,21 @@ def _edges(path: Path, data: bytes, at: int, element: Element, order: str) -> Ar
 
 
 def _equal_edges(data: bytes, at: int, element: Element, order: str) -> Array | None:
-    """The same where all rows have lists of the same lengths, as most files do; None where they do not."""
+    """Compute the edges of an element whose rows all have lists of equal length. Return None if the lengths differ."""
     fields: list[tuple[int, str, int]] = []
-    place = at
+    offset = at
     for p in element.properties:
         if p.length:
             numbers = _numbers(data, order + p.length)
-            if place >= len(numbers):
+            if offset >= len(numbers):
                 return None
-            fields.append((place, p.length, int(numbers[place])))
-            place += _size(p.length) + max(fields[-1][2], 0) * _size(p.type)
+            fields.append((offset, p.length, int(numbers[offset])))
+            offset += _size(p.length) + max(fields[-1][2], 0) * _size(p.type)
         else:
-            place += _size(p.type)
-    if element.count * (place - at) > len(data) - at:
+            offset += _size(p.type)
+    if element.count * (offset - at) > len(data) - at:
         return None
-    edges: Array = at + (place - at) * np.arange(element.count + 1)
+    edges: Array = at + (offset - at) * np.arange(element.count + 1)
     rows = edges[:-1] - at
     if all((_numbers(data, order + type_)[start + rows] == length).all() for start, type_, length in fields):
         return edges
@@ -161,8 +168,8 @@ def _equal_edges(data: bytes, at: int, element: Element, order: str) -> Array | 
 
 
 def _walked_edges(path: Path, data: bytes, at: int, element: Element, order: str) -> Array:
-    """The same for lists of differing lengths, from row to row."""
-    lists, before = [], 0  # the bytes before each list, its length, that one's size, and that of an item
+    """Compute the edges of an element with lists of different lengths, by reading row after row."""
+    lists, before = [], 0  # bytes before each list, reader of its length, size of the length, size of an item
     for p in element.properties:
         if p.length:
             read = struct.Struct((order or "<") + _STRUCT[p.length]).unpack_from
@@ -176,7 +183,7 @@ def _walked_edges(path: Path, data: bytes, at: int, element: Element, order: str
             for skip, read, length_size, item_size in lists:
                 (length,) = read(data, at + skip)
                 if length < 0:
-                    raise InputError(f"{path}: damaged: row {len(edges)} of element {shown(element.name)}")
+                    raise InputError(f"{path}: damaged: row {len(edges)} of element {printable(element.name)}")
                 at += skip + length_size + length * item_size
             at += before
             edges.append(at)

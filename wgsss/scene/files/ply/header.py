@@ -1,4 +1,4 @@
-"""The header of PLY files: which elements there are, and which properties they have.
+"""The header of PLY files: the elements and their properties.
 
 Source: "The PLY Polygon File Format" (Turk, 1994).
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from wgsss.errors import InputError
-from wgsss.scene.files.text import decoded, shown
+from wgsss.scene.files.text import decoded, printable
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -27,16 +27,18 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 @dataclass(frozen=True)
 class Property:
-    """A number of each row, or a list of them where there is a `length`; both are the letters of a numpy type."""
+    """A property of the rows of an element: one number, or a list of numbers."""
 
     name: str
     type: str
+    """numpy type of the number or of the items, such as "f4" """
     length: str | None = None
+    """numpy type of the length of a list; None for a single number"""
 
 
 @dataclass(frozen=True)
 class Element:
-    """A table of the file. Names are in lower case."""
+    """A table of the file with `count` rows. Names are in lower case."""
 
     name: str
     count: int
@@ -45,21 +47,24 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
+    """The header of a file."""
+
     order: str
-    """ "" for ASCII, "<" or ">" for binary"""
+    """byte order of a binary file, "<" or ">"; "" for ASCII"""
     elements: list[Element]
     comments: list[str]
     lines: int
+    """number of lines"""
     size: int
-    """in bytes"""
+    """size in bytes"""
 
 
 def read_header(path: Path, data: bytes) -> Header:
-    """The header of a file. Raises InputError, naming the line, where it is damaged."""
+    """Read the header of a file. Raises InputError, naming the line, if it is damaged."""
     first = re.match(rb"ply[ \t]*(\r(?!\n)|\r?\n)", data, re.IGNORECASE)
     if first is None:
         raise InputError(f"{path}: damaged, or not a .ply file: its first line is not 'ply'")
-    # The first line tells how lines end: what follows the last one may be binary, and look like more of the same.
+    # All lines end like the first one. The binary data after the last line may begin with bytes like a line end.
     line_end = rb"\r" if first[1] == b"\r" else rb"\r?\n"
     end = re.search(line_end + rb"[ \t]*end_header[ \t]*" + line_end, data)
     if end is None:
@@ -80,7 +85,7 @@ def read_header(path: Path, data: bytes) -> Header:
             else:
                 raise ValueError
         except (ValueError, LookupError):
-            raise InputError(f"{path}: line {number}: '{shown(line.strip())}' is not understood") from None
+            raise InputError(f"{path}: line {number}: '{printable(line.strip())}' is not understood") from None
     if order is None:
         raise InputError(f"{path}: damaged: the header names no format")
     return Header(order, elements, comments, len(lines) + 2, end.end())
