@@ -1,4 +1,4 @@
-"""Animations of glTF files: skins, morph targets and moving nodes, against values worked out by hand."""
+"""Animations of glTF files: skins, morph targets and moving nodes, against values computed by hand."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COMPONENTS = {"i1": g.BYTE, "u1": g.UNSIGNED_BYTE, "i2": g.SHORT, "u2": g.UNSIGN
 
 
 class File:
-    """A glTF file being put together: its tree, and what its accessors name."""
+    """A glTF file under construction: its tree, and the data of its accessors."""
 
     def __init__(self) -> None:
         self.tree = g.GLTF2(scene=0, scenes=[g.Scene(nodes=[])])
@@ -59,19 +59,19 @@ class File:
         return len(self.tree.nodes) - 1
 
     def animate(self, *channels: tuple[int, str, Any, Any], kind: str = "LINEAR", name: str | None = None) -> None:
-        found = g.Animation(name=name)
+        animation = g.Animation(name=name)
         for node, path, times, values in channels:
             shape = {"weights": "SCALAR", "rotation": "VEC4"}.get(path, "VEC3")
             values = np.ravel(values) if shape == "SCALAR" else values
             sampler = g.AnimationSampler(input=self.add(times, "SCALAR"), output=self.add(values, shape))
             sampler.interpolation = kind
             target = g.AnimationChannelTarget(node=node, path=path)
-            found.channels.append(g.AnimationChannel(sampler=len(found.samplers), target=target))
-            found.samplers.append(sampler)
-        self.tree.animations.append(found)
+            animation.channels.append(g.AnimationChannel(sampler=len(animation.samplers), target=target))
+            animation.samplers.append(sampler)
+        self.tree.animations.append(animation)
 
     def save(self, path: Path, uri: str | None = None) -> Path:
-        """As a .glb, or as a .gltf with a file beside it unless `uri` is where its data are."""
+        """Save as .glb, or as .gltf with its data at `uri`, by default a .bin file."""
         self.tree.buffers = [g.Buffer(byteLength=len(self.data))]
         if path.suffix == ".glb":
             self.tree.set_binary_blob(bytes(self.data))
@@ -83,13 +83,13 @@ class File:
 
 
 def box(low: Any = (-0.5, 0, -0.5), high: Any = (0.5, 2, 0.5)) -> tuple[Array, Array]:
-    """Eight vertices and twelve faces."""
-    made = trimesh.creation.box(bounds=[low, high])
-    return np.asarray(made.vertices), np.asarray(made.faces)
+    """Return the eight vertices and twelve faces of a box."""
+    mesh = trimesh.creation.box(bounds=[low, high])
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
 def bar() -> tuple[Array, Array]:
-    """A square bar from y 0 to 2 with a ring of vertices at y 1."""
+    """Return a square bar from y 0 to 2 with a ring of vertices at y 1."""
     ring = np.array([(-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5)])
     vertices = np.array([(x, y, z) for y in (0, 1, 2) for x, z in ring])
     faces = [(0, 2, 1), (0, 3, 2), (8, 9, 10), (8, 10, 11)]
@@ -100,8 +100,10 @@ def bar() -> tuple[Array, Array]:
 
 
 def arm(joints: str = "u1", weights: str = "f4") -> File:
-    """The bar on two joints, at y 0 and 1: its middle ring hangs on both, its top on the upper one, which turns a
-    quarter to the left in a second and back in another."""
+    """Make the bar with two joints, at y 0 and 1. The middle ring follows both, and the top follows the upper joint.
+
+    The upper joint rotates by a quarter turn to the left in one second, and back in another.
+    """
     file, (vertices, faces) = File(), bar()
     share = np.repeat([(1, 0, 0, 0), (0.5, 0.5, 0, 0), (0, 1, 0, 0)], 4, axis=0)
     top = {"f4": 1, "u1": 255, "u2": 65535}[weights]
@@ -121,7 +123,7 @@ def arm(joints: str = "u1", weights: str = "f4") -> File:
 
 
 def bent(rest: Array, turn: float) -> Array:
-    """Positions of the arm, its upper joint turned by an angle."""
+    """Compute the positions of the arm with its upper joint rotated by an angle."""
     x, y, z = rest.T
     cos, sin = math.cos(turn), math.sin(turn)
     turned = np.stack([x * cos - (y - 1) * sin, 1 + x * sin + (y - 1) * cos, z], axis=1)
@@ -129,7 +131,7 @@ def bent(rest: Array, turn: float) -> Array:
 
 
 def load(file: File, path: Path, **options: Any) -> LoadedMesh:
-    """Save and load, in the file's own units, with any warning an error."""
+    """Save and load a file in its own unit. Any warning is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return load_mesh(file.save(path), **{"mm_per_unit": 1, **options})
@@ -148,8 +150,8 @@ def at(loaded: LoadedMesh, time_s: float) -> Array:
 def test_a_skin_bends_an_arm(tmp_path: Path, joints: str, weights: str) -> None:
     loaded = load(arm(joints, weights), tmp_path / "arm.glb")
     rest = loaded.mesh.positions
-    assert len(rest) == 12 and rest.min(axis=0).tolist() == [-0.5, 0, -0.5], "where its node stands does not matter"
-    near = 1e-6 if weights == "f4" else 5e-3  # 127.5 / 255 is no byte
+    assert len(rest) == 12 and rest.min(axis=0).tolist() == [-0.5, 0, -0.5], "the place of its node has no effect"
+    near = 1e-6 if weights == "f4" else 5e-3  # 127.5 / 255 is not exact in a byte
     for time_s, turn in ((0, 0), (0.5, 45), (1, 90), (1.5, 45), (2.5, 45), (101, 90)):
         assert at(loaded, time_s) == pytest.approx(bent(rest, math.radians(turn)), abs=near)
     top = rest[:, 1] == 2
@@ -157,7 +159,7 @@ def test_a_skin_bends_an_arm(tmp_path: Path, joints: str, weights: str) -> None:
     assert loaded.motion is not None and loaded.motion.period_s == 2
 
 
-def test_lengths_are_those_at_rest(tmp_path: Path) -> None:
+def test_lengths_are_measured_at_rest(tmp_path: Path) -> None:
     for options, scale in (({"size_mm": 50}, 25), ({"mm_per_unit": None}, 1000)):
         loaded = load(arm(), tmp_path / "arm.glb", **options)
         assert loaded.mesh.bounds.tolist() == [[-0.5 * scale, 0, -0.5 * scale], [0.5 * scale, 2 * scale, 0.5 * scale]]
@@ -169,11 +171,11 @@ def test_joints_without_inverse_matrices_start_from_the_mesh_itself(tmp_path: Pa
     file = arm()
     file.tree.skins[0].inverseBindMatrices = None
     rest = load(file, tmp_path / "arm.glb").mesh.positions
-    assert rest[:, 1].max() == 3, "the upper joint lifts it by one"
+    assert rest[:, 1].max() == 3, "the upper joint raises it by one"
 
 
-def test_a_mesh_at_rest_is_as_its_skin_has_it(tmp_path: Path) -> None:
-    """Joints may stand elsewhere than where the mesh was bound; a mirror above the mesh is none of the skin's."""
+def test_a_mesh_at_rest_is_posed_by_its_skin(tmp_path: Path) -> None:
+    """Joints may have moved since the mesh was bound. A mirrored parent of the mesh does not affect the skin."""
     file = arm()
     file.tree.nodes[0].scale, file.tree.nodes[2].rotation = [-1, 1, 1], list(ABOUT_Z)
     file.tree.meshes[0].primitives[0].indices = file.add(bar()[1][:-2].ravel(), "SCALAR", "u2")
@@ -184,7 +186,7 @@ def test_a_mesh_at_rest_is_as_its_skin_has_it(tmp_path: Path) -> None:
     assert len(lowest) == 2 and (lowest[:, 1] < 0).all()
 
 
-def test_seams_stay_closed_though_their_vertices_are_carried_differently(tmp_path: Path) -> None:
+def test_seams_stay_closed_although_their_weights_differ(tmp_path: Path) -> None:
     file = arm()
     vertices, faces = bar()
     primitive = file.tree.meshes[0].primitives[0]
@@ -197,13 +199,13 @@ def test_seams_stay_closed_though_their_vertices_are_carried_differently(tmp_pat
     primitive.indices = file.add(split.ravel(), "SCALAR", "u2")
     file.tree.nodes[2].rotation = list(ABOUT_Z)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of two vertices welded
+        warnings.simplefilter("ignore")  # a warning that two vertices are welded
         loaded = load_mesh(file.save(tmp_path / "arm.glb"), mm_per_unit=1)
     assert len(loaded.mesh.positions) == 12
     assert at(loaded, 1) == pytest.approx(loaded.mesh.positions, abs=1e-6)
 
 
-def test_weights_count_by_their_share_and_joints_without_any_not_at_all(tmp_path: Path) -> None:
+def test_weights_are_normalised_and_joints_without_weight_are_ignored(tmp_path: Path) -> None:
     file = arm()
     attributes = primitive(file).attributes
     attributes.JOINTS_0 = file.add(np.tile((0, 1, 200, 0), (12, 1)), "VEC4", "u1")
@@ -212,8 +214,8 @@ def test_weights_count_by_their_share_and_joints_without_any_not_at_all(tmp_path
     assert at(loaded, 1) == pytest.approx(bent(loaded.mesh.positions, math.pi / 2), abs=1e-6)
 
 
-def test_normals_are_those_of_the_posed_surface(tmp_path: Path) -> None:
-    """The file's hard edges are of another pose than that at rest."""
+def test_normals_follow_the_posed_surface(tmp_path: Path) -> None:
+    """The hard edges of the file belong to another pose than the rest pose."""
     file = arm()
     outwards = bar()[0] * (1, 0, 1)
     primitive(file).attributes.NORMAL = file.add(outwards / np.linalg.norm(outwards, axis=1, keepdims=True), "VEC3")
@@ -223,7 +225,7 @@ def test_normals_are_those_of_the_posed_surface(tmp_path: Path) -> None:
 
 
 def test_two_skins_move_one_mesh_in_two_places(tmp_path: Path) -> None:
-    """Where it was modelled both are the same, and one would be dropped as a double."""
+    """In the modelled shape both copies coincide. One must not be dropped as a duplicate."""
     file = arm()
     upper = file.node(root=False, translation=[0, 1, 0])
     lower = file.node(children=[upper], translation=[30, 0, 0])
@@ -237,7 +239,7 @@ def test_two_skins_move_one_mesh_in_two_places(tmp_path: Path) -> None:
     assert at(loaded, 1)[~left] == pytest.approx(rest[~left])
 
 
-def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_path: Path) -> None:
+def test_vertices_without_weights_follow_the_first_joint_and_are_counted(tmp_path: Path) -> None:
     file = arm()
     share = np.zeros((12, 4))
     share[:8, 1] = 1
@@ -256,7 +258,7 @@ def test_morph_targets_add_up(tmp_path: Path) -> None:
     file, (vertices, faces) = File(), box()
     wide, tall = np.zeros((8, 3)), np.zeros((8, 3))
     wide[:, 0], tall[vertices[:, 1] == 2, 1] = 2 * vertices[:, 0], 4
-    sparse = g.Accessor(componentType=g.FLOAT, type="VEC3", count=8)  # zeros, but for the upper four
+    sparse = g.Accessor(componentType=g.FLOAT, type="VEC3", count=8)  # zeros except for the upper four
     rows = np.flatnonzero(vertices[:, 1] == 2)
     sparse.sparse = g.Sparse(
         count=4,
@@ -270,7 +272,7 @@ def test_morph_targets_add_up(tmp_path: Path) -> None:
     file.animate((0, "weights", (1, 3), ((0, 0.5), (1, 0))))
     loaded = load(file, tmp_path / "box.glb")
     rest = loaded.mesh.positions
-    assert rest[:, 1].max() == 1 + 2 + 0.25 * 4, "at rest as the mesh says"
+    assert rest[:, 1].max() == 1 + 2 + 0.25 * 4, "the weights at rest are those of the mesh"
     upper = rest[:, 1] > 2
     for time_s, grown, up in ((0, 2, 0), (1, 2, 0), (2, 1.5, 0.5), (2.5, 1.25, 0.75)):
         expected = rest * (grown, 1, 1)
@@ -278,7 +280,7 @@ def test_morph_targets_add_up(tmp_path: Path) -> None:
         assert at(loaded, time_s) == pytest.approx(expected)
 
 
-def test_a_node_has_a_say_in_its_morph_targets(tmp_path: Path) -> None:
+def test_weights_of_a_node_replace_those_of_its_mesh(tmp_path: Path) -> None:
     file, (vertices, faces) = File(), box()
     target = file.add(np.tile((0, 3, 0), (8, 1)), "VEC3")
     for shift in (0, 9):
@@ -291,10 +293,12 @@ def test_a_node_has_a_say_in_its_morph_targets(tmp_path: Path) -> None:
 
 
 def test_parts_move_with_their_nodes(tmp_path: Path) -> None:
-    """A mesh that two nodes place, a mirror, and a child, in whatever order they are read and however repaired."""
+    """One mesh at two nodes, a mirrored node and a child node, with repairs of the mesh."""
     file, (vertices, faces) = File(), box((0, 0, 0), (1, 1, 1))
-    spoiled = np.concatenate([[(9, 9, 9)], vertices, vertices])  # one unused, and all of them double
-    seamed = np.concatenate([[(1, 1, 2)], faces[:6] + 1, faces[6:] + 9, faces[:1] + 9])  # a needle, and one face double
+    spoiled = np.concatenate([[(9, 9, 9)], vertices, vertices])  # one is unused, and all others occur twice
+    seamed = np.concatenate(
+        [[(1, 1, 2)], faces[:6] + 1, faces[6:] + 9, faces[:1] + 9]
+    )  # a degenerate face and a duplicate
     twice = file.mesh(spoiled, seamed)
     file.node(mesh=twice, translation=[10, 0, 0])
     file.node(children=[2], translation=[0, 20, 0])
@@ -315,12 +319,12 @@ def test_parts_move_with_their_nodes(tmp_path: Path) -> None:
     moved = at(loaded, 1)
     assert moved[right] == pytest.approx(rest[right] + (3, 0, 0))
     assert moved[far] == pytest.approx(rest[far])
-    x, y, z = rest[high].T  # the mirrored one: turned by a quarter, then three times as high
+    x, y, z = rest[high].T  # the mirrored copy: rotated by a quarter turn, then three times as high
     assert moved[high] == pytest.approx(np.stack([-(y - 20), 20 + 3 * x, z], axis=1), abs=1e-5)
 
 
-def test_meshes_of_the_same_place_are_told_apart(tmp_path: Path) -> None:
-    """The one is wound inwards, and turned over as it is read."""
+def test_meshes_at_the_same_place_stay_separate(tmp_path: Path) -> None:
+    """One of them faces inwards, and is flipped when it is read."""
     file, (small, faces), (large, _) = File(), box(), box((5, 0, 0), (9, 4, 4))
     file.node(mesh=file.mesh(small, faces[:, ::-1]))
     file.node(mesh=file.mesh(large, faces))
@@ -345,40 +349,40 @@ def channel(path: str, kind: str, times: Any, values: Any) -> Channel:
     ("kind", "expected"),
     [("LINEAR", {0: 5, 1: 5, 2: 10, 3: 15, 9: 15}), ("STEP", {0: 5, 1: 5, 2.9: 5, 3: 15, 9: 15})],
 )
-def test_between_two_keys(kind: str, expected: dict[float, float]) -> None:
-    found = channel("translation", kind, (1, 3), ((5, 0, 0), (15, 0, 0)))
-    assert {time_s: found.at(time_s)[0] for time_s in expected} == expected
+def test_interpolation_between_two_keys(kind: str, expected: dict[float, float]) -> None:
+    result = channel("translation", kind, (1, 3), ((5, 0, 0), (15, 0, 0)))
+    assert {time_s: result.at(time_s)[0] for time_s in expected} == expected
 
 
-def test_a_cubic_spline_goes_through_a_cubic() -> None:
+def test_a_cubic_spline_reproduces_a_cubic() -> None:
     times = (1, 3, 4)
-    values = [((9 if t == 1 else 3 * t**2), t**3, (3 * t**2 if t < 4 else 9)) for t in times]  # 9: nobody looks there
-    found = channel("weights", "CUBICSPLINE", times, values)
+    values = [((9 if t == 1 else 3 * t**2), t**3, (3 * t**2 if t < 4 else 9)) for t in times]  # 9 is never used
+    result = channel("weights", "CUBICSPLINE", times, values)
     for time_s in (1, 1.5, 2.5, 3, 3.25, 4):
-        assert found.at(time_s)[0] == pytest.approx(time_s**3)
-    assert (found.at(0)[0], found.at(7)[0]) == (1, 64)
+        assert result.at(time_s)[0] == pytest.approx(time_s**3)
+    assert (result.at(0)[0], result.at(7)[0]) == (1, 64)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_rotations_take_the_shorter_way_at_an_even_pace(sign: float) -> None:
-    found = channel("rotation", "LINEAR", (0, 3), ((0, 0, 0, 2), sign * np.array(ABOUT_Z)))
+def test_rotations_take_the_shorter_way_at_constant_speed(sign: float) -> None:
+    result = channel("rotation", "LINEAR", (0, 3), ((0, 0, 0, 2), sign * np.array(ABOUT_Z)))
     for time_s in (0, 1, 2, 3):
         half = math.radians(15 * time_s)
-        value = found.at(time_s) / np.linalg.norm(found.at(time_s))
+        value = result.at(time_s) / np.linalg.norm(result.at(time_s))
         assert abs(value @ (0, 0, math.sin(half), math.cos(half))) == pytest.approx(1, abs=1e-9)
 
 
-def test_equal_rotations_stay() -> None:
-    found = channel("rotation", "LINEAR", (0, 1), (ABOUT_Z, ABOUT_Z))
-    assert found.at(0.3) == pytest.approx(ABOUT_Z)
+def test_equal_rotations_give_no_motion() -> None:
+    result = channel("rotation", "LINEAR", (0, 1), (ABOUT_Z, ABOUT_Z))
+    assert result.at(0.3) == pytest.approx(ABOUT_Z)
 
 
 @pytest.mark.parametrize("kind", ["STEP", "CUBICSPLINE"])
-def test_the_file_says_what_lies_between_keys(tmp_path: Path, kind: str) -> None:
+def test_interpolation_is_chosen_by_the_file(tmp_path: Path, kind: str) -> None:
     file, (vertices, faces) = File(), box()
     file.node(mesh=file.mesh(vertices, faces))
     values = np.array([(0, 0, 0), (8, 0, 0)], float)
-    if kind == "CUBICSPLINE":  # t^3 again, in x
+    if kind == "CUBICSPLINE":  # x is t^3 as well
         values = np.array([(0, 0, 0), (0, 0, 0), (0, 0, 0), (12, 0, 0), (8, 0, 0), (0, 0, 0)], float)
     file.animate((0, "translation", (0, 2), values), kind=kind)
     loaded = load(file, tmp_path / "box.glb")
@@ -396,7 +400,7 @@ def two_animations() -> File:
     return file
 
 
-def test_the_first_animation_or_the_one_named(tmp_path: Path) -> None:
+def test_the_first_animation_or_a_named_one_plays(tmp_path: Path) -> None:
     path = two_animations().save(tmp_path / "arm.glb")
 
     def shift(**options: Any) -> list[float]:
@@ -427,7 +431,7 @@ def test_a_single_key_is_a_pose(tmp_path: Path) -> None:
         assert at(loaded, time_s) == pytest.approx(bent(loaded.mesh.positions, math.pi / 2), abs=1e-6)
 
 
-def test_an_animation_that_moves_nothing_of_the_mesh_is_none(tmp_path: Path) -> None:
+def test_an_animation_that_does_not_move_the_mesh_is_none(tmp_path: Path) -> None:
     file = arm()
     file.tree.animations.clear()
     file.animate((file.node(), "translation", (0, 1), ((0, 0, 0), (4, 0, 0))))
@@ -435,7 +439,7 @@ def test_an_animation_that_moves_nothing_of_the_mesh_is_none(tmp_path: Path) -> 
         assert load_mesh(file.save(tmp_path / "arm.glb"), mm_per_unit=1).motion is None
 
 
-def test_scene_files_choose_it(tmp_path: Path) -> None:
+def test_scene_files_choose_an_animation(tmp_path: Path) -> None:
     two_animations().save(tmp_path / "arm.glb")
 
     def scene(more: str) -> Any:
@@ -456,7 +460,7 @@ def test_scene_files_choose_it(tmp_path: Path) -> None:
         assert str(raised.value).startswith(f"{tmp_path / 'scene.toml'}: [[object]] 1: ")
 
 
-def test_a_mesh_on_its_own_plays_it_in_view_of_the_camera(tmp_path: Path) -> None:
+def test_an_animated_mesh_is_in_view_of_the_camera(tmp_path: Path) -> None:
     file = arm()
     file.tree.animations.clear()
     file.animate((1, "translation", (0, 1, 2), ((0, 0, 0), (40, 10, 0), (0, 0, 0))))
@@ -473,7 +477,7 @@ def test_a_mesh_on_its_own_plays_it_in_view_of_the_camera(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_buffers_beside_or_inside_the_text(tmp_path: Path, inside: bool) -> None:
+def test_buffers_in_files_or_data_uris(tmp_path: Path, inside: bool) -> None:
     expected = at(load(arm(), tmp_path / "arm.glb"), 1)
     file = arm()
     data = base64.b64encode(bytes(file.data)).decode()
@@ -603,7 +607,7 @@ BAD: dict[str, tuple[Callable[[File], Any], str]] = {
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning:trimesh")
 @pytest.mark.parametrize("name", BAD)
-def test_bad_files_are_named_with_what_is_wrong(tmp_path: Path, name: str) -> None:
+def test_errors_name_the_file_and_the_location(tmp_path: Path, name: str) -> None:
     change, message = BAD[name]
     path = spoil(change).save(tmp_path / "arm.glb")
     with pytest.raises(InputError) as raised:
@@ -620,35 +624,37 @@ def test_a_transform_that_is_not_finite(tmp_path: Path) -> None:
         load_mesh(path)
 
 
-def test_a_mesh_that_vanishes_for_a_while(tmp_path: Path) -> None:
+def test_a_mesh_is_scaled_to_nothing_for_a_while(tmp_path: Path) -> None:
     file = arm()
     file.animate((1, "scale", (0, 1, 2), ((1, 1, 1), (0, 0, 0), (1, 1, 1))), name="Blink")
     file.tree.animations.reverse()
-    thing = load_scene(file.save(tmp_path / "arm.glb"), size_mm=100).objects[0]
-    assert [thing.at(time_s).mesh.shrunk for time_s in (0.0, 0.5, 1.0, 1.5, 2.0)] == [False, False, True, False, False]
+    body = load_scene(file.save(tmp_path / "arm.glb"), size_mm=100).objects[0]
+    assert [body.at(time_s).mesh.shrunk for time_s in (0.0, 0.5, 1.0, 1.5, 2.0)] == [False, False, True, False, False]
 
 
-def test_a_mesh_of_other_vertices_is_refused(tmp_path: Path) -> None:
+def test_a_mesh_with_another_number_of_vertices_is_refused(tmp_path: Path) -> None:
     loaded = load(arm(), tmp_path / "arm.glb")
     assert loaded.motion is not None
     with pytest.raises(InputError, match="animation Bend: it moves 12 vertices, and no others"):
         loaded.motion.apply(np.zeros((7, 3)), 0)
 
 
-def test_the_command_line_writes_nothing_of_a_bad_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_writes_no_file_for_a_bad_animation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from wgsss.cli import main
 
     path = spoil(BAD["joint out of range"][0]).save(tmp_path / "arm.glb")
     assert main(["render", str(path), "--frames", "2", "-o", str(tmp_path / "arm.mp4")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"wgsss: error: {path}: mesh 0") and said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert message.startswith(f"wgsss: error: {path}: mesh 0") and message.count("\n") == 1
     assert [file.name for file in tmp_path.iterdir()] == ["arm.glb"]
 
 
 # --- real files ------------------------------------------------------------------------------------------------------
 
 
-def test_a_fox_looks_round_walks_and_runs(data: Path) -> None:
+def test_the_fox_looks_round_walks_and_runs(data: Path) -> None:
     path = data / "anim" / "Fox.glb"
     for name, period in (("Survey", 3.417), ("Walk", 0.708), ("Run", 1.158)):
         loaded = load_mesh(path, mm_per_unit=1, animation=name)
@@ -659,14 +665,14 @@ def test_a_fox_looks_round_walks_and_runs(data: Path) -> None:
             moved = mesh.deformed(at(loaded, time_s))
             length = [np.linalg.norm(np.diff(m.positions[ends], axis=1)[:, 0], axis=1) for m in (mesh, moved)]
             least, most = np.quantile(length[1] / length[0], [0.01, 0.99])
-            assert least > 0.5 and most < 3, "nothing tears"
+            assert least > 0.5 and most < 3, "no edge becomes too long"
             assert moved.area == pytest.approx(mesh.area, rel=0.1)
-            assert moved.bounds[0, 1] > -8, "it stays above the ground"
+            assert moved.bounds[0, 1] > -8, "the fox stays above the ground"
     feet = mesh.positions[:, 1] < 5
     assert np.ptp([at(loaded, t)[feet].mean(axis=0) for t in (0.1, 0.4, 0.8)], axis=0).max() > 10
 
 
-def test_a_sphere_becomes_a_blob_and_a_ship(data: Path) -> None:
+def test_a_sphere_is_morphed_to_a_blob_and_a_ship(data: Path) -> None:
     loaded = load_mesh(data / "anim" / "AnimatedMorphSphere.glb", mm_per_unit=1)
     assert np.linalg.norm(at(loaded, 0), axis=1) == pytest.approx(1, abs=1e-5)
     assert np.ptp(at(loaded, 4.3), axis=0) == pytest.approx((6.1, 2, 5.8), abs=0.1)

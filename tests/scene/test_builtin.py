@@ -1,4 +1,4 @@
-"""Built-in scenes: what each one promises, lights of the right order, and objects that fill the image."""
+"""Built-in scenes: names and docstrings, lights of the right magnitude, and objects that fill the image."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def test_the_camera_frames_the_objects_with_a_small_margin(scenes: dict[str, Sce
         high.append((clip[:, :2] / clip[:, 3:]).max(axis=0))
     low, high = np.min(low, axis=0), np.max(high, axis=0)
     assert np.abs([low, high]).max() == pytest.approx(1 / 1.08, abs=0.02)
-    assert low == pytest.approx(-high, abs=0.12), "the objects are in the middle"
+    assert low == pytest.approx(-high, abs=0.12), "the objects are centred"
 
 
 def irradiance(scene: Scene) -> float:
-    """W/m^2, green, of all lights but the environment on surfaces facing them in the middle of the scene."""
+    """Compute the irradiance, W/m^2, green, of all lights except the environment on facing surfaces at the centre."""
     middle, total = scene.bounds.mean(axis=0), 0.0
     for light in scene.lights:
         match light:
@@ -64,7 +64,7 @@ def irradiance(scene: Scene) -> float:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_lights_are_of_the_order_that_exposure_zero_wants(scenes: dict[str, Scene], name: str) -> None:
+def test_lights_suit_an_exposure_of_zero(scenes: dict[str, Scene], name: str) -> None:
     assert 2 < irradiance(scenes[name]) < 16
     for light in scenes[name].lights:
         if isinstance(light, EnvironmentLight):
@@ -94,7 +94,7 @@ def test_crowd_shares_one_mesh_and_stands_apart(copies: int) -> None:
     assert apart.size == 0 or apart.min() > 220
 
 
-def test_bad_counts() -> None:
+def test_bad_vertex_counts_are_errors() -> None:
     with pytest.raises(InputError, match="copies must be a whole number from 1 to 16, not 17"):
         crowd(copies=17)
     with pytest.raises(InputError, match="ear: vertices must be a whole number from 500 to 500000, not 3"):

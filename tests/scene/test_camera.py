@@ -1,4 +1,4 @@
-"""View and projection matrices against points worked out by hand, and cameras that orbit and turn."""
+"""View and projection matrices against points computed by hand, and cameras that orbit and turn."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_orthographic_spans_its_height_and_depth_from_0_to_1() -> None:
     np.testing.assert_allclose(project(camera, (0, 0, 3), 2.0, 2, 12), [0, 0, 0.5], atol=1e-12)
 
 
-def test_up_need_not_be_upright() -> None:
+def test_up_need_not_be_perpendicular_to_the_view() -> None:
     tilted = PerspectiveCamera((0, 0, 10), (0, 0, 0), up=(0, 2, 5)).view()
     np.testing.assert_allclose(tilted, PerspectiveCamera((0, 0, 10), (0, 0, 0)).view(), atol=1e-12)
     np.testing.assert_allclose(tilted[:3, :3] @ tilted[:3, :3].T, np.eye(3), atol=1e-12)
@@ -56,19 +56,19 @@ def test_up_need_not_be_upright() -> None:
     ("azimuth", "elevation", "eye"),
     [(0, 0, (1, 2, 13)), (90, 0, (11, 2, 3)), (0, 30, (1, 7, 3 + 10 * math.cos(math.pi / 6))), (180, 0, (1, 2, -7))],
 )
-def test_orbit(azimuth: float, elevation: float, eye: tuple) -> None:
+def test_orbit_places_the_eye(azimuth: float, elevation: float, eye: tuple) -> None:
     camera = OrthographicCamera.orbit((1, 2, 3), 10, azimuth, elevation, height=20)
     np.testing.assert_allclose(camera.eye, eye, atol=1e-12)
     assert camera.target == (1, 2, 3) and camera.height == 20
 
 
 @pytest.mark.parametrize("kind", [PerspectiveCamera, OrthographicCamera])
-def test_turning_goes_about_up_through_the_target(kind: type) -> None:
+def test_a_turning_camera_rotates_about_up_through_the_target(kind: type) -> None:
     camera = kind.orbit((1, 2, 3), 10, 20, 40, turn=90)
     later = camera.at(0.5)
     np.testing.assert_allclose(later.eye, kind.orbit((1, 2, 3), 10, 65, 40).eye, atol=1e-12)
     assert later.turn == 0
-    assert later.at(1.0) == later, "a still must stay one"
+    assert later.at(1.0) == later, "a camera of a still image does not change"
     assert kind((0, 0, 1), (0, 0, 0)).at(3.0) == kind((0, 0, 1), (0, 0, 0))
 
 
@@ -100,13 +100,13 @@ def test_turning_goes_about_up_through_the_target(kind: type) -> None:
         ),
     ],
 )
-def test_a_camera_that_cannot_be_is_refused(kind: type, fields: dict, message: str) -> None:
+def test_invalid_cameras_are_refused(kind: type, fields: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         kind(**fields)
 
 
 @pytest.mark.parametrize(("aspect", "near", "far"), [(0, 1, 2), (1, 0, 2), (1, 2, 2), (1, 1, math.inf)])
-def test_a_projection_that_cannot_be_is_refused(aspect: float, near: float, far: float) -> None:
+def test_invalid_projections_are_refused(aspect: float, near: float, far: float) -> None:
     with pytest.raises(InputError, match="no projection"):
         PerspectiveCamera((0, 0, 1), (0, 0, 0)).projection(aspect, near, far)
 
@@ -122,7 +122,7 @@ def test_a_projection_that_cannot_be_is_refused(aspect: float, near: float, far:
         ({"elevation": "high"}, "elevation must be from .*, not 'high'"),
     ],
 )
-def test_an_orbit_names_its_own_values(changed: dict[str, Any], says: str) -> None:
+def test_errors_of_an_orbit_name_its_values(changed: dict[str, Any], says: str) -> None:
     orbit: dict[str, Any] = {"target": (0, 0, 0), "distance": 100.0, "azimuth": 20.0, "elevation": 10.0}
     for kind in (PerspectiveCamera, OrthographicCamera):
         kind.orbit(**orbit)

@@ -1,4 +1,4 @@
-"""Alpha masks cut out of a mesh: areas against closed forms, closed seams, and what repeats."""
+"""Alpha masks that cut a mesh: areas against closed forms, closed seams, and wrapping."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ REPEAT = ("repeat", "repeat")
 
 
 def ellipse(size: int, a: float = 0.4, b: float = 0.24, soft: bool = False) -> Array:
-    """Alpha (size, size): 1 within an ellipse of half axes a and b about the middle, 0.5 on its outline where soft."""
+    """Return alpha (size, size): 1 in a centred ellipse with half axes a and b, with a soft outline on request."""
     t = (np.arange(size) + 0.5) / size - 0.5
     r = np.hypot(t[None, :] / a, t[:, None] / b)
     return np.clip((1 - r) * 8 + 0.5, 0, 1) if soft else (r < 1).astype(float)
@@ -30,7 +30,7 @@ def area(positions: Array, faces: Array) -> float:
 
 
 def edges(faces: Array) -> Counter[int]:
-    """How many edges are those of one face, of two, and so on."""
+    """Count the edges by their number of faces."""
     ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1).reshape(-1, 2), 1)
     return Counter(np.unique(ends, axis=0, return_counts=True)[1].tolist())
 
@@ -42,14 +42,14 @@ def test_an_ellipse_on_two_triangles(size: int, soft: bool) -> None:
     positions = blend.of(SQUARE)
     assert area(positions, faces) == pytest.approx(np.pi * 0.4 * 0.24, rel=0.02 if size == 64 else 0.004)
     normal = np.cross(*(positions[faces[:, i]] - positions[faces[:, 0]] for i in (1, 2)))
-    assert normal[:, 2].min() >= 0, "no face is turned over"
-    assert set(edges(faces)) == {1, 2}, "it is one sheet without cracks"
+    assert normal[:, 2].min() >= 0, "no face is flipped"
+    assert set(edges(faces)) == {1, 2}, "the surface has no cracks"
     r = np.hypot((positions[:, 0] - 0.5) / 0.4, (positions[:, 1] - 0.5) / 0.24)
     assert r.max() < 1 + 3 / (0.24 * size)
-    assert len(faces) < 40 * size, "faces are small at the outline only"
+    assert len(faces) < 40 * size, "only faces at the outline are small"
 
 
-def test_vertices_are_blends_of_their_triangles() -> None:
+def test_vertices_interpolate_their_triangles() -> None:
     blend, faces = cut(SQUARE, HALVES, SQUARE[:, :2], Mask(ellipse(64), 0.5, REPEAT))
     assert blend.weight.sum(axis=1) == pytest.approx(1) and blend.weight.min() >= 0
     assert blend.of(SQUARE[:, :2]) == pytest.approx(blend.of(SQUARE)[:, :2])
@@ -60,15 +60,15 @@ def test_vertices_are_blends_of_their_triangles() -> None:
     ("wrap", "share"),
     [(REPEAT, 1.0), (("mirror", "repeat"), 1.0), (("repeat", "mirror"), 1.0), (("clamp", "repeat"), 1 / 3)],
 )
-def test_masks_wrap_as_their_texture(wrap: tuple[str, str], share: float) -> None:
-    """Three by three tiles from -1 to 2; clamped along u, only the middle column shows the ellipse."""
+def test_masks_wrap_like_their_texture(wrap: tuple[str, str], share: float) -> None:
+    """Coordinates from -1 to 2 show three by three tiles. Clamped along u, only the middle column shows the ellipse."""
     uvs = SQUARE[:, :2] * 3 - 1
     blend, faces = cut(SQUARE, HALVES, uvs, Mask(ellipse(96), 0.5, wrap))
     assert area(blend.of(SQUARE), faces) == pytest.approx(np.pi * 0.4 * 0.24 * share, rel=0.01)
 
 
 def test_a_mirrored_mask_is_mirrored() -> None:
-    """Alpha in the left half: from 0 to 2, its mirror joins it at u = 1 where nothing is, and at 2 where it is."""
+    """Alpha covers the left half of the image. From u = 0 to 2, the mirrored copy covers the right end."""
     left = np.zeros((16, 16))
     left[:, :8] = 1
     blend, faces = cut(SQUARE, HALVES, SQUARE[:, :2] * [2, 1], Mask(left, 0.5, ("mirror", "repeat")))
@@ -76,7 +76,7 @@ def test_a_mirrored_mask_is_mirrored() -> None:
     assert ((x < 0.27) | (x > 0.73)).all() and (x > 0.73).any() and (x < 0.27).any()
 
 
-def test_all_nothing_and_a_hole() -> None:
+def test_masks_that_keep_all_nothing_or_all_but_a_hole() -> None:
     whole = cut(SQUARE, HALVES, SQUARE[:, :2], Mask(np.ones((4, 4)), 0.5, REPEAT))
     assert np.array_equal(whole[0].of(SQUARE)[whole[1]], SQUARE[HALVES])
     assert len(cut(SQUARE, HALVES, SQUARE[:, :2], Mask(np.zeros((4, 4)), 0.5, REPEAT))[1]) == 0
@@ -88,13 +88,13 @@ def test_a_cutoff_of_zero_keeps_everything() -> None:
     assert len(cut(SQUARE, HALVES, SQUARE[:, :2], Mask(ellipse(32), 0.0, REPEAT))[1]) == 2
 
 
-def test_a_seam_is_split_alike_on_both_sides() -> None:
-    """Two squares side by side, whose common edge has other texture coordinates on either side."""
+def test_a_seam_is_split_equally_on_both_sides() -> None:
+    """Two adjacent squares have different texture coordinates on the two sides of their common edge."""
     positions = np.concatenate([SQUARE, SQUARE + np.array([1, 0, 0])])
     faces = np.concatenate([HALVES, HALVES + 4])
     uvs = np.concatenate([SQUARE[:, :2], SQUARE[:, :2] * [1, 0.2]])
     solid = ellipse(64, 0.45, 0.45)
-    solid[:, -8:] = 1  # the first square is whole at the seam, and its edge there is split only for the other's sake
+    solid[:, -8:] = 1  # the first square is solid at the seam; its edge is split only to match the other square
     solid[:, :4] = np.arange(64)[:, None] % 8 < 4
     blend, cut_faces = cut(positions, faces, uvs, Mask(solid, 0.5, REPEAT))
     at = np.round(blend.of(positions), 9)
@@ -108,7 +108,7 @@ def test_a_seam_is_split_alike_on_both_sides() -> None:
     assert 3 not in edges(welded)
 
 
-def test_noise_cannot_fill_the_memory() -> None:
+def test_a_noisy_mask_uses_limited_memory() -> None:
     noise = np.random.default_rng(0).integers(0, 2, (1024, 1024)).astype(float)
     _, faces = cut(SQUARE, HALVES, SQUARE[:, :2], Mask(noise, 0.5, REPEAT))
     assert 0 < len(faces) <= 2 * MOST_FACES

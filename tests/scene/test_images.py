@@ -1,4 +1,4 @@
-"""Textures of every depth and kind."""
+"""Textures of every bit depth and format."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ def encoded(image: Image.Image, **options: Any) -> bytes:
 
 
 def tiff(pixels: np.ndarray, **options: Any) -> bytes:
-    found = iio.imwrite("<bytes>", pixels, plugin="tifffile", extension=".tif", **options)
-    assert found is not None
-    return found
+    data = iio.imwrite("<bytes>", pixels, plugin="tifffile", extension=".tif", **options)
+    assert data is not None
+    return data
 
 
 @pytest.mark.parametrize("interlaced", [False, True])
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
 @pytest.mark.parametrize("pixels", [DEEP, SHALLOW], ids=["16 bits", "8 bits"])
 def test_a_png_keeps_its_depth(pixels: np.ndarray, channels: int, interlaced: bool) -> None:
-    found = read_pixels(png(pixels[..., :channels], interlaced=interlaced))
-    np.testing.assert_array_equal(found, pixels[..., :channels])
-    assert found.dtype == pixels.dtype
+    result = read_pixels(png(pixels[..., :channels], interlaced=interlaced))
+    np.testing.assert_array_equal(result, pixels[..., :channels])
+    assert result.dtype == pixels.dtype
 
 
-def test_a_map_has_the_channels_asked_for_rounded_to_eight_bits() -> None:
+def test_a_map_has_the_channels_of_its_mode_in_eight_bits() -> None:
     grey, colours, alpha = DEEP[..., :1], DEEP[..., :3], DEEP[..., 3]
     luma = colours @ np.array([0.299, 0.587, 0.114])
     for pixels, rgb, light, opacity in (
@@ -66,7 +66,7 @@ def test_a_map_has_the_channels_asked_for_rounded_to_eight_bits() -> None:
 
 
 @pytest.mark.parametrize("mode", ["RGB", "L"])
-def test_eight_bits_are_what_pillow_makes_of_them(mode: str) -> None:
+def test_eight_bits_agree_with_pillow(mode: str) -> None:
     for channels in (1, 3, 4):
         file = png(SHALLOW[..., :channels])
         np.testing.assert_array_equal(read_map(file, mode), np.asarray(Image.open(io.BytesIO(file)).convert(mode)))
@@ -90,11 +90,11 @@ def test_a_palette_with_transparency() -> None:
 
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("pixels", [DEEP, SHALLOW], ids=["16 bits", "8 bits"])
-def test_a_colour_that_is_transparent(pixels: np.ndarray, channels: int) -> None:
+def test_a_transparent_colour_becomes_alpha(pixels: np.ndarray, channels: int) -> None:
     key = pixels[4, 5, :channels]
     file = png(pixels[..., :channels], trns=key.astype(">u2").tobytes())
-    found = read_map(file, "A")
-    assert found[4, 5] == 0 and (found == 255).sum() >= found.size - 20
+    alpha = read_map(file, "A")
+    assert alpha[4, 5] == 0 and (alpha == 255).sum() >= alpha.size - 20
     np.testing.assert_array_equal(
         read_map(file, "RGB")[..., 0], rounded(DEEP[..., 0]) if pixels is DEEP else pixels[..., 0]
     )
@@ -102,12 +102,12 @@ def test_a_colour_that_is_transparent(pixels: np.ndarray, channels: int) -> None
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
 @pytest.mark.parametrize("shape", [(9, 8), (9, 8, 3)])
-def test_floating_point_is_linear_and_encoded_for_colours(dtype: type, shape: tuple[int, ...]) -> None:
+def test_floating_point_colours_are_encoded_as_srgb(dtype: type, shape: tuple[int, ...]) -> None:
     linear = np.linspace(0, 1, int(np.prod(shape))).reshape(shape).astype(dtype)
     file = tiff(linear)
-    wanted = linear.astype(float) if linear.ndim == 3 else np.repeat(linear[..., None].astype(float), 3, axis=2)
-    np.testing.assert_array_equal(read_map(file, "RGB", linear=True), np.floor(wanted * 255 + 0.5))
-    srgb = np.where(wanted <= 0.0031308, 12.92 * wanted, 1.055 * wanted ** (1 / 2.4) - 0.055)
+    expected = linear.astype(float) if linear.ndim == 3 else np.repeat(linear[..., None].astype(float), 3, axis=2)
+    np.testing.assert_array_equal(read_map(file, "RGB", linear=True), np.floor(expected * 255 + 0.5))
+    srgb = np.where(expected <= 0.0031308, 12.92 * expected, 1.055 * expected ** (1 / 2.4) - 0.055)
     assert np.abs(read_map(file, "RGB") - srgb * 255).max() <= 0.51
     assert (read_map(file, "A") == 255).all()
 
@@ -124,8 +124,8 @@ def test_numbers_beyond_one_are_clamped_with_a_warning_and_nan_is_refused(tmp_pa
     linear[0, 0], linear[1, 1] = 7.0, -1.0
     (tmp_path / "a.tif").write_bytes(tiff(linear))
     with pytest.warns(UserWarning, match=r"a\.tif: 2 pixels outside 0 to 1 are clamped"):
-        found = read_map(tmp_path / "a.tif", "L", linear=True)
-    assert (found[0, 0], found[1, 1], found[2, 2]) == (255, 0, 128)
+        result = read_map(tmp_path / "a.tif", "L", linear=True)
+    assert (result[0, 0], result[1, 1], result[2, 2]) == (255, 0, 128)
     linear[2, 2] = np.nan
     with pytest.raises(InputError, match=r"^1 pixels are not finite numbers$"):
         read_map(tiff(linear), "L")
@@ -154,13 +154,13 @@ def test_tiff_in_which_white_is_zero() -> None:
     ("dtype", "full"), [(np.int16, 2**15 - 1), (np.uint32, 2**32 - 1), (np.int32, 2**31 - 1), (np.int32, 2**16 - 1)]
 )
 def test_integers_of_other_types_span_their_range(dtype: type, full: int) -> None:
-    """Of 32 bits, those that fit 16 bits are such of 16 bits, for which many programs have no type."""
+    """Integers of 32 bits that fit into 16 bits are read as 16 bits, since many programs store 16 bits in this way."""
     values = (np.linspace(0, 1, 64).reshape(8, 8) * full).astype(dtype)
-    found = read_map(tiff(values), "L").astype(float)
-    assert np.abs(found - np.linspace(0, 255, 64).reshape(8, 8)).max() <= 0.51
+    result = read_map(tiff(values), "L").astype(float)
+    assert np.abs(result - np.linspace(0, 255, 64).reshape(8, 8)).max() <= 0.51
 
 
-def test_integers_below_zero_count_as_zero_with_a_warning() -> None:
+def test_negative_integers_become_zero_with_a_warning() -> None:
     values = np.array([[-32768, -1], [0, 32767]], np.int16)
     with pytest.warns(UserWarning, match="below 0"):
         assert read_map(tiff(values), "L").tolist() == [[0, 0], [0, 255]]
@@ -171,7 +171,7 @@ def test_cmyk_and_orientation_of_jpeg() -> None:
     red = read_map(encoded(image, format="jpeg"), "RGB")
     assert red.shape == (8, 16, 3) and np.abs(red - np.array([255, 0, 0])).max() < 8
     exif = Image.Exif()
-    exif[0x0112] = 6  # a quarter turn, which glTF wants ignored
+    exif[0x0112] = 6  # a quarter turn, which glTF ignores
     turned = encoded(Image.new("RGB", (16, 8), "red"), format="jpeg", exif=exif)
     assert read_map(turned, "RGB").shape == (8, 16, 3)
 
@@ -185,21 +185,21 @@ def test_other_formats(tmp_path: Path, kind: str) -> None:
     assert read_map(file, "RGB")[1, 2].tolist() == [255, 0, 0]
 
 
-def test_an_extension_that_lies_does_not_matter(tmp_path: Path) -> None:
+def test_a_wrong_extension_does_not_matter(tmp_path: Path) -> None:
     file = tmp_path / "a.jpg"
     file.write_bytes(png(SHALLOW[..., :3]))
     np.testing.assert_array_equal(read_map(file, "RGB"), SHALLOW[..., :3])
 
 
 def header_only(width: int, height: int, depth: int = 8, kind: int = 2) -> bytes:
-    """A PNG that claims a size, with next to no pixels."""
+    """Make a PNG with a size in its header and almost no pixels."""
     head = struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 0)
     chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(bytes(99))), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(name, content) for name, content in chunks)
 
 
 @pytest.mark.parametrize(("width", "height"), [(9000, 9000), (MAX_SIDE + 1, 1), (1, 40000), (60000, 60000)])
-def test_a_size_is_refused_from_the_header(tmp_path: Path, width: int, height: int) -> None:
+def test_a_large_image_is_refused_before_decoding(tmp_path: Path, width: int, height: int) -> None:
     wide = io.BytesIO(
         b"II*\0\x08\0\0\0\x04\0"
         + struct.pack("<HHIIHHIIHHIIHHII", 256, 4, 1, width, 257, 4, 1, height, 258, 3, 1, 16, 273, 4, 1, 8)
@@ -220,7 +220,7 @@ def test_a_size_is_refused_from_the_header(tmp_path: Path, width: int, height: i
         read_map(tmp_path / "a.png", "RGB")
 
 
-def test_what_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+def test_unreadable_images_give_one_line(tmp_path: Path) -> None:
     whole = png(SHALLOW)
     deep = png(DEEP)
     files = {
@@ -235,19 +235,19 @@ def test_what_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         "cut.tif": (tiff(DEEP[..., 0])[:200], "damaged, or not an image"),
         "cut.jpg": (encoded(Image.fromarray(SHALLOW[..., :3]), format="jpeg")[:300], "damaged, or not an image"),
     }
-    for name, (content, said) in files.items():
+    for name, (content, message) in files.items():
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(InputError, match=said) as raised:
+        with pytest.raises(InputError, match=message) as raised:
             read_map(tmp_path / name, "RGB")
         assert str(raised.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(raised.value)
 
 
-def test_what_is_no_regular_file_is_refused_unopened(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.png")  # to open it would wait for ever
+def test_pipes_and_folders_are_refused_unopened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.png")  # opening it would block
     (tmp_path / "link.png").symlink_to("/dev/zero")
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "lost.png").symlink_to(tmp_path / "nowhere")
-    for name, said in {
+    for name, message in {
         "pipe.png": "not a regular file",
         "link.png": "not a regular file",
         "folder.png": "a folder",
@@ -255,12 +255,12 @@ def test_what_is_no_regular_file_is_refused_unopened(tmp_path: Path) -> None:
         "\0.png": "not the name of a file",
         "a" * 300: "cannot be read",
     }.items():
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=message):
             read_map(tmp_path / name, "RGB")
 
 
 def test_damaged_bytes_give_one_line_or_a_picture() -> None:
-    """Of 100 files, a few bytes of each of which are other ones, or missing."""
+    """In each of 100 files, a few bytes are changed or missing."""
     whole = [
         png(DEEP),
         png(SHALLOW[..., :3], interlaced=True),
@@ -280,8 +280,8 @@ def test_damaged_bytes_give_one_line_or_a_picture() -> None:
                 data[at] = random.integers(256)
             cut = len(data) if i % 3 else int(random.integers(len(data)))
             try:
-                found = read_map(bytes(data[:cut]), "RGBA")
+                result = read_map(bytes(data[:cut]), "RGBA")
             except InputError as error:
                 assert "\n" not in str(error) and len(str(error)) < 200
             else:
-                assert found.dtype == np.uint8 and found.shape[2] == 4
+                assert result.dtype == np.uint8 and result.shape[2] == 4

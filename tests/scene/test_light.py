@@ -1,4 +1,4 @@
-"""Lights and what is wrong with them; environments from files."""
+"""Lights and their validation; environments from files."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def test_constant_environment_is_one_pixel() -> None:
 def test_an_image_is_multiplied_by_the_radiance(tmp_path: Path) -> None:
     pixels = np.linspace(0, 2, 4 * 8 * 3).reshape(4, 8, 3).astype(np.float32)
     light = EnvironmentLight((1, 2, 3), write_environment(tmp_path / "sky.exr", pixels))
-    found = light.pixels()
-    assert found.dtype == np.float32
-    np.testing.assert_allclose(found, pixels * [1, 2, 3], rtol=1e-6)
+    radiance = light.pixels()
+    assert radiance.dtype == np.float32
+    np.testing.assert_allclose(radiance, pixels * [1, 2, 3], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("radiance", "pixel"), [(1e12, 10.0), (1.0, 1e13), (1.0, 1e38)])
-def test_an_environment_too_bright_for_numbers_is_refused(tmp_path: Path, radiance: float, pixel: float) -> None:
+def test_an_environment_that_is_too_bright_is_refused(tmp_path: Path, radiance: float, pixel: float) -> None:
     file = write_environment(tmp_path / "sky.exr", np.full((4, 8, 3), pixel))
     light = EnvironmentLight((radiance,) * 3, file)
     with pytest.raises(InputError, match=r"sky\.exr: an environment has at most 1e\+12 W/\(m\^2 sr\), not 1e\+"):
@@ -88,7 +88,7 @@ def test_an_environment_too_bright_for_numbers_is_refused(tmp_path: Path, radian
 @pytest.mark.parametrize(
     ("file", "message"), [("no.hdr", "no such file"), ("sky.png", "must be a .hdr or .exr file"), (".", "must be a")]
 )
-def test_a_file_that_is_not_there_or_of_another_kind(tmp_path: Path, file: str, message: str) -> None:
+def test_a_missing_file_or_another_format_is_an_error(tmp_path: Path, file: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         EnvironmentLight(file=str(tmp_path / file)).pixels()
 
@@ -98,4 +98,4 @@ def test_real_light_probes(data: Path, name: str) -> None:
     pixels = EnvironmentLight(file=str(data / "env" / name)).pixels()
     assert pixels.shape == (512, 1024, 3)
     assert np.isfinite(pixels).all() and pixels.min() >= 0
-    assert 0.1 < pixels.mean() < 2 and pixels.max() > 50, "a probe has bright lamps or a sun"
+    assert 0.1 < pixels.mean() < 2 and pixels.max() > 50, "a light probe has bright lamps or a sun"

@@ -102,7 +102,7 @@ MINIMAL = '[[object]]\nmesh = "box.ply"\n'
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """What SCENE names, beside where it will be written."""
+    """Return a folder with the files that SCENE names."""
     image = pytest.importorskip("PIL.Image")
     trimesh.creation.box((1, 2, 4)).export(tmp_path / "box.ply")
     (tmp_path / "sky").mkdir()
@@ -127,7 +127,7 @@ def refused(path: Any, **options: Any) -> str:
 # --- scene files -----------------------------------------------------------------------------------------------------
 
 
-def test_a_scene_file_is_the_dataclasses(folder: Path) -> None:
+def test_a_scene_file_corresponds_to_the_dataclasses(folder: Path) -> None:
     scene = load_scene(write(folder, SCENE))
     assert (scene.name, scene.exposure, scene.tone_map) == ("bust", 0.5, "reinhard")
     assert scene.camera == OrthographicCamera((0, 0, 100), (0, 1, 0), height=20, turn=30)
@@ -158,7 +158,7 @@ def test_a_scene_file_is_the_dataclasses(folder: Path) -> None:
     assert body.motion is not None and body.motion.bend == 30
 
 
-def test_what_a_scene_file_leaves_out_is_as_for_a_mesh(folder: Path) -> None:
+def test_defaults_of_a_scene_file_are_those_of_a_mesh(folder: Path) -> None:
     scene, mesh = load_scene(write(folder, MINIMAL, "small.toml")), load_scene(folder / "box.ply")
     assert scene.name == "small" and mesh.name == "box"
     assert scene.lights == mesh.lights and scene.camera == mesh.camera
@@ -232,7 +232,7 @@ def test_errors_name_file_table_and_key(folder: Path, old: str, new: str, messag
     assert message in refused(write(folder, SCENE.replace(old, new)))
 
 
-def test_tables_of_the_wrong_form(folder: Path) -> None:
+def test_tables_of_the_wrong_form_are_errors(folder: Path) -> None:
     assert refused(write(folder, "name = 'x'")) == "there is no [[object]] to render"
     assert refused(write(folder, "[object]\nmesh = 'box.ply'")) == "object must be a list of tables: [[object]]"
     assert refused(write(folder, f"camera = 3\n{MINIMAL}")) == "[camera] must be a table, not 3"
@@ -252,13 +252,13 @@ def test_errors_name_the_file_once(folder: Path) -> None:
 # --- materials -------------------------------------------------------------------------------------------------------
 
 
-def test_a_material_file_stands_by_itself(folder: Path) -> None:
+def test_a_material_file_is_read_on_its_own(folder: Path) -> None:
     (folder / "materials").mkdir()
     wax = "sigma_a = [0.01, 0.02, 0.03]\nsigma_s_prime = [1, 1, 1]\neta = 1.4\nbase_color_map = '../color.png'\n"
     path = write(folder, wax, "materials/wax.toml")
-    made = load_material(path)
-    assert (made.name, made.eta, made.sigma_a) == ("wax", 1.4, (0.01, 0.02, 0.03))
-    assert made.maps.base_color is not None
+    material = load_material(path)
+    assert (material.name, material.eta, material.sigma_a) == ("wax", 1.4, (0.01, 0.02, 0.03))
+    assert material.maps.base_color is not None
     scene = load_scene(write(folder, MINIMAL + 'material = "materials/wax.toml"'))
     assert scene.objects[0].material.name == "wax"
     assert load_scene(folder / "box.ply", material=str(path)).objects[0].material.name == "wax"
@@ -281,20 +281,20 @@ def test_a_material_file_stands_by_itself(folder: Path) -> None:
         ('preset = "marble"\ngaussians = { variances = [1], weights = [[1, 1, 1]] }', True),
     ],
 )
-def test_a_preset_gives_way_to_the_other_kind_of_profile(folder: Path, table: str, gaussian: bool) -> None:
-    made = load_material(write(folder, table, "m.toml"))
-    assert isinstance(made.profile, SumOfGaussians) == gaussian
-    assert made.name in ("skin", "marble")
+def test_a_profile_in_the_file_replaces_that_of_the_preset(folder: Path, table: str, gaussian: bool) -> None:
+    material = load_material(write(folder, table, "m.toml"))
+    assert isinstance(material.profile, SumOfGaussians) == gaussian
+    assert material.name in ("skin", "marble")
 
 
-def test_a_base_colour_texture_takes_the_place_of_a_presets_colour_but_not_of_a_given_one(folder: Path) -> None:
+def test_a_base_colour_map_replaces_the_colour_of_a_preset_but_not_a_given_colour(folder: Path) -> None:
     skin = 'preset = "skin"\nbase_color_map = "color.png"\n'
     assert load_material(write(folder, skin, "m.toml")).base_color == (1, 1, 1)
     assert load_material(write(folder, skin + "base_color = [0.5, 1, 1]", "m.toml")).base_color == (0.5, 1, 1)
     assert load_material(write(folder, 'preset = "skin"', "m.toml")).base_color == MATERIALS["skin"].base_color
 
 
-def test_the_textures_of_a_mesh_are_worn_by_whatever_material(folder: Path) -> None:
+def test_textures_of_a_mesh_are_kept_with_any_material(folder: Path) -> None:
     from PIL import Image
 
     box = trimesh.creation.box()
@@ -304,7 +304,7 @@ def test_the_textures_of_a_mesh_are_worn_by_whatever_material(folder: Path) -> N
     worn = load_scene(folder / "box.glb", material="skin").objects[0].material
     assert worn.gaussians is SKIN_GAUSSIANS and worn.base_color == (1, 1, 1)
     assert worn.maps.base_color is not None and worn.maps.base_color[0, 0].tolist() == [90, 90, 90]
-    assert MATERIALS["skin"].maps.base_color is None, "the preset itself stays as it is"
+    assert MATERIALS["skin"].maps.base_color is None, "the preset itself is unchanged"
     scene = load_scene(write(folder, MINIMAL.replace("ply", "glb")), material="ketchup")
     assert scene.objects[0].material.name == "ketchup" and scene.objects[0].material.maps.base_color is not None
 
@@ -320,7 +320,7 @@ def test_a_built_in_scene() -> None:
     assert milky.objects[0].material.name == "skimmilk" and milky.lights == scene.lights
 
 
-def test_a_name_that_is_not_known() -> None:
+def test_an_unknown_name_is_an_error() -> None:
     assert refused("spere").startswith("unknown scene 'spere'; did you mean 'sphere'? (known: ")
     assert all(name in refused("nothing like it") for name in SCENES)
     assert refused("sphere.toml") == "no such file"
@@ -329,7 +329,7 @@ def test_a_name_that_is_not_known() -> None:
     assert refused("box.ply", material="marbel").startswith("unknown material 'marbel'")
 
 
-def test_options_that_do_not_apply(folder: Path) -> None:
+def test_options_that_do_not_apply_are_errors(folder: Path) -> None:
     assert refused("sphere", size_mm=10) == "size_mm is for mesh files, and this is a scene"
     assert "size_mm is for mesh files" in refused(write(folder, MINIMAL), size_mm=10)
     assert refused(folder / "box.ply", vertices=10) == "vertices is for built-in scenes; a file has those it has"
@@ -342,7 +342,7 @@ def test_a_mesh_is_framed_and_lit_from_both_sides(folder: Path, size_mm: float |
     assert np.ptp(scene.bounds, axis=0).max() == pytest.approx(size_mm or 4)
     clip = np.c_[scene.objects[0].placed, np.ones(8)] @ (scene.camera.projection(1, 1e-3, 1e6) @ scene.camera.view()).T
     reach = np.abs(clip[:, :2] / clip[:, 3:]).max()
-    assert 0.9 < reach < 0.95, "it fills the image, with a margin"
+    assert 0.9 < reach < 0.95, "the mesh fills the image, with a margin"
     assert (clip[:, 3] > 0).all()
 
     towards_camera = np.subtract(scene.camera.eye, scene.camera.target)
@@ -351,7 +351,7 @@ def test_a_mesh_is_framed_and_lit_from_both_sides(folder: Path, size_mm: float |
     assert any(isinstance(light, EnvironmentLight) for light in scene.lights)
 
 
-def test_camera_lights_and_material_may_be_given_as_in_a_scene_file(folder: Path) -> None:
+def test_camera_lights_and_material_are_given_in_the_syntax_of_scene_files(folder: Path) -> None:
     box = folder / "box.ply"
     sun = {"kind": "directional", "direction": [0, -1, 0], "irradiance": [1, 2, 3]}
     lamp = PointLight((1.0, 2.0, 3.0), (1.0, 1.0, 1.0))
@@ -365,12 +365,12 @@ def test_camera_lights_and_material_may_be_given_as_in_a_scene_file(folder: Path
     assert "light: unknown key 'intensity'" in refused(box, lights=[{**sun, "intensity": 1}])
 
 
-def test_a_scene_at_a_time_is_a_still(folder: Path) -> None:
+def test_a_scene_at_a_time_does_not_move(folder: Path) -> None:
     scene = load_scene(write(folder, SCENE))
     still = scene.at(1.0)
     assert not np.allclose(still.objects[2].mesh.positions, scene.objects[2].mesh.positions)
     assert still.objects[2].motion is None and still.camera.turn == 0
-    assert still.objects[0] is scene.objects[0], "what does not move is not made again"
+    assert still.objects[0] is scene.objects[0], "objects that do not move are reused"
     np.testing.assert_allclose(still.camera.eye, OrthographicCamera((0, 0, 100), (0, 1, 0), turn=30).at(1).eye)
 
 
@@ -381,11 +381,11 @@ def test_bounds_follow_the_placement(folder: Path) -> None:
 
 def test_rotations_are_about_x_then_y_then_z(folder: Path) -> None:
     scene = load_scene(write(folder, MINIMAL + "rotate = [90, 90, 0]"))
-    # About x, y goes to z; about y, that z goes to x.
+    # The rotation about x takes y to z; the rotation about y takes z to x.
     np.testing.assert_allclose(scene.objects[0].matrix @ [0, 1, 0, 0], [1, 0, 0, 0], atol=1e-12)
 
 
-def test_importing_scenes_is_light() -> None:
+def test_importing_scenes_loads_no_heavy_packages() -> None:
     heavy = "trimesh scipy skimage imageio OpenEXR PIL wgpu xatlas"
     code = f"import sys, wgsss.scene; print([m for m in '{heavy}'.split() if m in sys.modules])"
     root = Path(__file__).parents[2]

@@ -29,25 +29,25 @@ WAX = {"name": "wax", "sigma_a": (0.01, 0.02, 0.03), "sigma_s_prime": (1.0, 1.1,
 
 @pytest.mark.parametrize("name", JENSEN)
 def test_measured_material(name: str) -> None:
-    found = MATERIALS[name]
+    material = MATERIALS[name]
     sigma_s_prime, sigma_a, total = JENSEN[name]
-    assert (found.name, found.sigma_s_prime, found.sigma_a) == (name, sigma_s_prime, sigma_a)
-    assert found.eta == (1.5 if name == "marble" else 1.3)
-    assert found.gaussians is None and isinstance(found.profile, Dipole)
-    np.testing.assert_allclose(found.profile.total, total, atol=1e-3)
+    assert (material.name, material.sigma_s_prime, material.sigma_a) == (name, sigma_s_prime, sigma_a)
+    assert material.eta == (1.5 if name == "marble" else 1.3)
+    assert material.gaussians is None and isinstance(material.profile, Dipole)
+    np.testing.assert_allclose(material.profile.total, total, atol=1e-3)
 
 
-def test_skin_is_the_six_gaussians_tinted_by_what_skin_reflects() -> None:
+def test_skin_is_the_six_gaussians_tinted_by_its_reflectance() -> None:
     skin = MATERIALS["skin"]
     assert set(MATERIALS) == {*JENSEN, "skin"}
     assert skin.profile is SKIN_GAUSSIANS
     np.testing.assert_allclose(skin.profile.total, 1.0, atol=1e-12)
     assert skin.base_color == (0.63, 0.44, 0.34)
-    assert ((skin.eta - 1) / (skin.eta + 1)) ** 2 == pytest.approx(0.028, abs=3e-4)  # what d'Eon & Luebke give
+    assert ((skin.eta - 1) / (skin.eta + 1)) ** 2 == pytest.approx(0.028, abs=3e-4)  # the value of d'Eon & Luebke
 
 
 @pytest.mark.parametrize("spelling", ["wholemilk", "Whole Milk", "WHOLE_MILK", " whole-milk "])
-def test_names_in_any_spelling(spelling: str) -> None:
+def test_names_are_accepted_in_any_spelling(spelling: str) -> None:
     assert material(spelling) is MATERIALS["wholemilk"]
 
 
@@ -107,6 +107,6 @@ def test_transport_at_its_limits() -> None:
         {"specular": np.zeros((0, 4), np.uint8)},
     ],
 )
-def test_a_map_of_another_layout_is_refused(maps: dict) -> None:
+def test_a_map_with_the_wrong_shape_is_refused(maps: dict) -> None:
     with pytest.raises(InputError, match=f"the {next(iter(maps))} map must be uint8 of H x W"):
         Maps(**maps)

@@ -1,4 +1,4 @@
-"""Meshes from files: every format, seams and hard edges kept, repairs counted in one warning, bad input named."""
+"""Meshes from files of every format: seams and hard edges are kept, repairs are counted, and errors name the file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
 
 def quiet_load(path: Path, **options: Any) -> LoadedMesh:
-    """Load, with any warning an error."""
+    """Load a mesh. Any warning is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return load_mesh(path, **options)
@@ -41,7 +41,7 @@ def load_with_warning(path: Path, **options: Any) -> tuple[LoadedMesh, str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_mesh(path, **options)
-    assert len(caught) == 1, "one warning tells of all repairs"
+    assert len(caught) == 1, "all repairs are in one warning"
     text = str(caught[0].message)
     assert text.startswith(f"{path.name}: ") and "\n" not in text
     return loaded, text
@@ -57,7 +57,7 @@ def export(mesh: trimesh.Trimesh | trimesh.Scene, path: Path) -> Path:
 
 
 def write_off(path: Path, vertices: Any, faces: Any) -> Path:
-    """A file whose vertices and faces are what is written here, and nothing more."""
+    """Write an OFF file with these vertices and faces."""
     lines = ["OFF", f"{len(vertices)} {len(faces)} 0"]
     lines += [" ".join(f"{x:.9g}" for x in v) for v in vertices]
     lines += [" ".join(map(str, [len(f), *f])) for f in faces]
@@ -74,7 +74,7 @@ def ball(radius: float = 1.0) -> trimesh.Trimesh:
 
 
 def edge_uses(mesh: Mesh) -> Counter:
-    """How often each number of faces per edge occurs: {2: n} for a closed manifold."""
+    """Count the edges by their number of faces: {2: n} for a closed manifold."""
     edges = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, 1)], -1).reshape(-1, 2), 1)
     return Counter(np.unique(edges, axis=0, return_counts=True)[1].tolist())
 
@@ -88,7 +88,7 @@ def volume(mesh: Mesh) -> float:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_format_gives_the_same_welded_mesh(tmp_path: Path, suffix: str) -> None:
+def test_all_formats_give_the_same_welded_mesh(tmp_path: Path, suffix: str) -> None:
     path = export(box(), tmp_path / f"box{suffix}")
     scale = 1000 if suffix in (".glb", ".gltf") else 1  # glTF is in metres
     mesh = quiet_load(path).mesh
@@ -129,8 +129,8 @@ def test_quads_and_larger_faces_are_triangulated(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", ["off", "ascii", "binary_little_endian", "binary_big_endian"])
 @pytest.mark.parametrize("sizes", [(3, 4), (4, 5), (3, 4, 5), (5,)])
-def test_faces_of_differing_sizes(tmp_path: Path, form: str, sizes: tuple[int, ...]) -> None:
-    """Prisms over polygons, side by side in one file: triangles, quads and pentagons in every mixture."""
+def test_faces_of_different_sizes_are_triangulated(tmp_path: Path, form: str, sizes: tuple[int, ...]) -> None:
+    """A file has prisms over polygons: triangles, quads and pentagons in every combination."""
     vertices: list[tuple] = []
     faces: list[list[int]] = []
     for i, n in enumerate(sizes):
@@ -164,10 +164,10 @@ def test_scene_graph_places_and_mirrors_the_parts(tmp_path: Path) -> None:
     mesh = quiet_load(export(scene, tmp_path / "two.glb"), mm_per_unit=1).mesh
     assert len(mesh.faces) == 12 + 320
     np.testing.assert_allclose(mesh.bounds, [[-1, -1.5, -2], [12, 1.5, 2]], atol=1e-6)
-    assert volume(mesh) == pytest.approx(24 + 2 * ball().volume, rel=1e-5), "a mirrored part must not turn inside out"
+    assert volume(mesh) == pytest.approx(24 + 2 * ball().volume, rel=1e-5), "a mirrored part is not inside out"
 
 
-def test_parts_that_touch_are_welded_whatever_their_placement(tmp_path: Path) -> None:
+def test_touching_parts_are_welded_in_any_placement(tmp_path: Path) -> None:
     ring, matrix = ball(), trimesh.transformations.euler_matrix(0.3, 1.1, -0.7)
     matrix[:3, 3] = 0.123, 4.56, -7.89
     scene = trimesh.Scene()
@@ -182,7 +182,7 @@ def test_parts_that_touch_are_welded_whatever_their_placement(tmp_path: Path) ->
 
 # --- texture coordinates and normals ---------------------------------------------------------------------------------
 
-# Two squares folded along an edge, whose two sides have texture coordinates of their own.
+# Two squares share an edge, and have different texture coordinates on its two sides.
 SEAM = """
 v 0 0 0
 v 1 0 0
@@ -215,7 +215,7 @@ SEAM_UVS = {  # (face normal, position) -> u right, v down
 
 def check_seam(mesh: Mesh) -> None:
     assert (len(mesh.positions), len(mesh.faces)) == (6, 4)
-    assert edge_uses(mesh) == {1: 6, 2: 3}, "the seam must not part the two squares"
+    assert edge_uses(mesh) == {1: 6, 2: 3}, "the two squares stay connected at the seam"
     assert mesh.corner_uvs is not None and mesh.corner_uvs.dtype == np.float32
     for normal, face, uvs in zip(mesh.face_normals, mesh.faces, mesh.corner_uvs, strict=True):
         side = "z" if abs(normal[2]) > 0.5 else "x"
@@ -248,8 +248,8 @@ def test_ply_with_texture_coordinates_per_corner(tmp_path: Path) -> None:
     check_seam(load_with_warning(path)[0].mesh)
 
 
-def test_ply_normals_stay_with_their_vertices_beside_texture_coordinates(tmp_path: Path) -> None:
-    """Vertices deliberately in an order that sorting by texture coordinates would change."""
+def test_ply_normals_stay_with_their_vertices_if_there_are_texture_coordinates(tmp_path: Path) -> None:
+    """The order of the vertices differs from that of their texture coordinates."""
     normals = trimesh.creation.box().face_normals
     rows, faces = [], []
     for i, triangle in enumerate(reversed(trimesh.creation.box().triangles)):
@@ -281,8 +281,8 @@ def test_hard_edges_of_the_file_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_hard_edges_of_faces_that_are_turned_over_are_kept(tmp_path: Path, sign: int) -> None:
-    """Whether the file's normals point outwards or go with the winding: what is drawn is a box with hard edges."""
+def test_hard_edges_of_flipped_faces_are_kept(tmp_path: Path, sign: int) -> None:
+    """Normals of the file may point outwards or follow the winding. The result has hard edges in both cases."""
     flat = box()
     flat.unmerge_vertices()
     normals = sign * np.repeat(flat.face_normals, 3, axis=0)
@@ -297,7 +297,7 @@ def test_hard_edges_of_faces_that_are_turned_over_are_kept(tmp_path: Path, sign:
     np.testing.assert_allclose(mesh.corner_normals, np.repeat(own[:, None], 3, 1), atol=1e-6)
 
 
-def test_smooth_normals_of_the_file_are_our_own(tmp_path: Path) -> None:
+def test_smooth_normals_of_the_file_are_replaced(tmp_path: Path) -> None:
     path = tmp_path / "ball.ply"
     sphere = ball()
     sphere.vertex_normals = sphere.vertices
@@ -359,13 +359,13 @@ def test_a_texture_that_is_missing_or_damaged_is_left_out(tmp_path: Path) -> Non
     assert loaded.maps.base_color is None
 
 
-def test_no_textures_where_trimesh_makes_some_up(tmp_path: Path) -> None:
+def test_a_mesh_without_textures_gets_none(tmp_path: Path) -> None:
     (tmp_path / "seam.obj").write_text(SEAM)
     maps = load_with_warning(tmp_path / "seam.obj")[0].maps
     assert maps.base_color is None and maps.normal is None and maps.specular is None
 
 
-def test_one_texture_for_all_parts_or_none(tmp_path: Path) -> None:
+def test_a_texture_must_be_shared_by_all_parts(tmp_path: Path) -> None:
     def two(first: Any, second: Any) -> trimesh.Scene:
         scene = trimesh.Scene(textured(first))
         scene.add_geometry(textured(second), transform=trimesh.transformations.translation_matrix((9, 0, 0)))
@@ -400,7 +400,7 @@ def test_degenerate_and_duplicate_faces_and_unused_and_duplicate_vertices(tmp_pa
     vertices = [*b.vertices, (9, 9, 9), b.vertices[0], (b.vertices[0] + b.vertices[1]) / 2]
     a, c = b.faces[0][0], b.faces[0][1]
     faces = [*b.faces.tolist(), [a, a, c], [a, c, a], [0, 1, 10], np.roll(b.faces[3], 1).tolist()]
-    faces[0] = [9 if i == 0 else i for i in faces[0]]  # may or may not name the copy
+    faces[0] = [9 if i == 0 else i for i in faces[0]]  # the face may refer to the copy
     faces[1] = [9 if i == 0 else i for i in faces[1]]
     loaded, text = load_with_warning(write_off(tmp_path / "messy.off", vertices, faces))
     assert text == (
@@ -411,18 +411,18 @@ def test_degenerate_and_duplicate_faces_and_unused_and_duplicate_vertices(tmp_pa
     assert loaded.mesh.area == pytest.approx(52)
 
 
-def test_welding_on_its_own_is_no_news_where_the_format_splits(tmp_path: Path) -> None:
+def test_welding_is_not_noted_if_the_format_splits_vertices(tmp_path: Path) -> None:
     assert len(quiet_load(export(ball(), tmp_path / "ball.stl")).mesh.positions) == 162
 
 
-def test_inverted_mesh_is_turned_over(tmp_path: Path) -> None:
+def test_an_inverted_mesh_is_flipped(tmp_path: Path) -> None:
     sphere = ball()
     loaded, text = load_with_warning(write_off(tmp_path / "ball.off", sphere.vertices, sphere.faces[:, ::-1]))
     assert text == "ball.off: 320 faces wound inwards, turned over"
     assert volume(loaded.mesh) == pytest.approx(sphere.volume)
 
 
-def test_inverted_mesh_with_a_small_hole_is_turned_over(tmp_path: Path) -> None:
+def test_an_inverted_mesh_with_a_small_hole_is_flipped(tmp_path: Path) -> None:
     sphere = ball()
     loaded, text = load_with_warning(write_off(tmp_path / "ball.off", sphere.vertices + 5, sphere.faces[1:, ::-1]))
     assert text == "ball.off: 319 faces wound inwards, turned over; 3 boundary edges (1 hole)"
@@ -430,7 +430,7 @@ def test_inverted_mesh_with_a_small_hole_is_turned_over(tmp_path: Path) -> None:
     assert (outwards > 0).all()
 
 
-def test_faces_that_disagree_with_their_neighbours_are_turned_over_with_their_texture(tmp_path: Path) -> None:
+def test_faces_that_disagree_with_their_neighbours_are_flipped_with_their_texture(tmp_path: Path) -> None:
     (tmp_path / "seam.obj").write_text(SEAM.replace("f 2/5 5/6 6/7 3/8", "f 3/8 6/7 5/6 2/5"))
     loaded, text = load_with_warning(tmp_path / "seam.obj")
     assert "2 faces wound inwards, turned over" in text
@@ -444,7 +444,7 @@ def test_faces_that_disagree_with_their_neighbours_are_turned_over_with_their_te
     assert volume(loaded.mesh) == pytest.approx(sphere.volume)
 
 
-def test_of_two_bodies_only_the_inverted_one_is_turned_over_but_no_cavity(tmp_path: Path) -> None:
+def test_inverted_bodies_are_flipped_but_not_cavities(tmp_path: Path) -> None:
     outer, other, inner = ball(2), ball(1), ball(1)
     apart = trimesh.Trimesh(
         np.concatenate([outer.vertices, other.vertices + 5]),
@@ -463,14 +463,14 @@ def test_of_two_bodies_only_the_inverted_one_is_turned_over_but_no_cavity(tmp_pa
     assert volume(quiet_load(hollow).mesh) == pytest.approx(outer.volume - inner.volume, rel=1e-5)
 
 
-def test_what_cannot_be_mended_is_counted_and_kept(tmp_path: Path) -> None:
+def test_defects_without_repair_are_counted_and_kept(tmp_path: Path) -> None:
     fan = write_off(tmp_path / "fan.off", [(0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (-1, -1, 0)], [
         (0, 1, 2), (0, 1, 3), (0, 1, 4),
     ])  # fmt: skip
     loaded, text = load_with_warning(fan)
     assert text == "fan.off: 6 boundary edges (1 hole); 1 edge of more than two faces" and len(loaded.mesh.faces) == 3
 
-    turns = np.arange(12) * np.pi / 12  # a strip whose ends meet after half a twist
+    turns = np.arange(12) * np.pi / 12  # a Moebius strip
     centre = np.stack([np.cos(2 * turns), np.sin(2 * turns), 0 * turns], 1)
     across = np.stack([np.cos(turns) * centre[:, 0], np.cos(turns) * centre[:, 1], np.sin(turns)], 1) * 0.3
     strip = [[2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1] for i in range(11)] + [[22, 1, 0, 23]]
@@ -496,7 +496,7 @@ def bad(path: Path, **options: Any) -> str:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_files_that_are_not_what_their_extension_says(
+def test_files_with_a_wrong_extension_are_errors(
     tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / f"thing{suffix}"
@@ -519,14 +519,14 @@ def test_files_that_are_not_what_their_extension_says(
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl", ".off", ".glb"])
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
-def test_truncated_files(tmp_path: Path, suffix: str, share: float) -> None:
+def test_truncated_files_are_errors(tmp_path: Path, suffix: str, share: float) -> None:
     path = export(ball(), tmp_path / f"ball{suffix}")
     content = path.read_bytes()
     path.write_bytes(content[: int(len(content) * share)])
     assert re.match("damaged|truncated", bad(path))
 
 
-def test_faces_without_vertices(tmp_path: Path) -> None:
+def test_faces_without_vertices_are_errors(tmp_path: Path) -> None:
     path = tmp_path / "far.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
     assert bad(path) == "line 4: vertex 9 does not exist (the file has 3)"
@@ -535,7 +535,7 @@ def test_faces_without_vertices(tmp_path: Path) -> None:
     assert bad(path) == "row 1 of element face: vertex 7 does not exist (there are 3)"
 
 
-def test_damaged_numbers_in_text(tmp_path: Path) -> None:
+def test_damaged_numbers_in_text_are_errors(tmp_path: Path) -> None:
     path = tmp_path / "typo.obj"
     path.write_text("v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n")
     assert bad(path) == "line 2: 'zero' is not a number"
@@ -543,7 +543,7 @@ def test_damaged_numbers_in_text(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", ["nan", "inf", "1e39"])
 @pytest.mark.parametrize("suffix", [".obj", ".off"])
-def test_positions_that_are_not_finite(tmp_path: Path, value: str, suffix: str) -> None:
+def test_positions_that_are_not_finite_are_errors(tmp_path: Path, value: str, suffix: str) -> None:
     path = tmp_path / f"bad{suffix}"
     if suffix == ".obj":
         path.write_text(f"v 0 0 0\nv 1 {value} 0\nv 0 1 0\nf 1 2 3\n")
@@ -555,7 +555,7 @@ def test_positions_that_are_not_finite(tmp_path: Path, value: str, suffix: str) 
     )
 
 
-def test_nothing_to_render(tmp_path: Path) -> None:
+def test_meshes_without_faces_are_errors(tmp_path: Path) -> None:
     assert "the mesh is empty" in bad(write_off(tmp_path / "points.off", TRIANGLE[0], []))
     (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
     assert "the mesh is empty" in bad(tmp_path / "points.obj")
@@ -564,7 +564,7 @@ def test_nothing_to_render(tmp_path: Path) -> None:
     assert bad(line) == "the mesh has no area: all 1 faces are degenerate"
 
 
-def test_bad_scales_and_file_extensions(tmp_path: Path) -> None:
+def test_bad_scales_and_file_extensions_are_errors(tmp_path: Path) -> None:
     path = write_off(tmp_path / "one.off", *TRIANGLE)
     assert bad(path, size_mm=0) == "size_mm must be a number above 0, not 0"
     assert bad(path, mm_per_unit=-1) == "mm_per_unit must be a number above 0, not -1"
@@ -584,14 +584,14 @@ def cube(**fields: Any) -> Mesh:
     return Mesh(b.vertices, b.faces, **fields)
 
 
-def test_normals_are_weighted_by_angle_so_that_diagonals_do_not_matter() -> None:
+def test_normals_are_weighted_by_angle() -> None:
     mesh = cube()
     np.testing.assert_allclose(mesh.normals, mesh.positions / np.sqrt(3), atol=1e-6)
     assert mesh.normals.dtype == np.float32
     np.testing.assert_array_equal(mesh.shading_normals, mesh.normals[mesh.faces])
 
 
-def test_normals_are_unit_even_where_faces_cancel_out() -> None:
+def test_normals_have_unit_length_even_if_faces_cancel_out() -> None:
     sheet = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 1)])
     np.testing.assert_allclose(np.linalg.norm(sheet.normals, axis=1), 1)
 
@@ -608,12 +608,12 @@ def test_deformed_keeps_topology_and_texture_and_smooths_the_normals() -> None:
         mesh.deformed(mesh.positions[:-1])
 
 
-def test_arrays_are_read_only_and_leave_the_callers_alone() -> None:
+def test_arrays_are_read_only_copies() -> None:
     positions = np.eye(3, dtype=np.float32)
     mesh = Mesh(positions, [(0, 1, 2)])
     with pytest.raises(ValueError, match="read-only"):
         mesh.positions[0, 0] = 5
-    positions[0, 0] = 1  # still the caller's
+    positions[0, 0] = 1  # the array of the caller is still writable
 
 
 @pytest.mark.parametrize(
@@ -627,7 +627,7 @@ def test_arrays_are_read_only_and_leave_the_callers_alone() -> None:
         ({"corner_normals": np.full((12, 3, 3), np.inf)}, "corner_normals holds a number that is not finite"),
     ],
 )
-def test_arrays_that_do_not_fit_are_refused(fields: dict, message: str) -> None:
+def test_inconsistent_arrays_are_refused(fields: dict, message: str) -> None:
     b = box()
     with pytest.raises(InputError, match=message):
         Mesh(**{"positions": b.vertices, "faces": b.faces, "name": "thing", **fields})
@@ -641,7 +641,7 @@ REAL = {  # triangles, boundary edges, has texture coordinates, has hard edges
     "bunny_hr.obj": (59664, 0, False, False),
     "bunny_stanford.ply": (69451, 223, False, False),
     "stanford_dragon_100k.obj": (100000, 0, False, False),
-    "happy_buddha_100k.obj": (99997, 0, False, False),  # 100,000 with 3 that occur twice
+    "happy_buddha_100k.obj": (99997, 0, False, False),  # 100,000 minus 3 duplicates
     "spot.obj": (5856, 0, True, False),
     "anim/Fox.glb": (576, 0, True, False),
     "anim/AnimatedMorphSphere.glb": (960, 0, False, False),
@@ -665,7 +665,7 @@ def test_real_meshes(data: Path, name: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(mesh.shading_normals, axis=2), 1, atol=1e-5)
 
 
-def test_the_head_is_as_large_as_a_head(data: Path) -> None:
+def test_the_head_has_the_size_of_a_head(data: Path) -> None:
     head = load_mesh(data / "lee_perry_smith" / "LeePerrySmith.obj", mm_per_unit=950).mesh
     np.testing.assert_allclose(np.ptp(head.bounds, axis=0), [430.6, 400.0, 260.9], atol=0.1)
     assert len(head.positions) == 8844
@@ -676,10 +676,10 @@ def test_the_bunny_has_five_holes(data: Path) -> None:
     assert text == "bunny_stanford.ply: 1113 unused vertices dropped; 223 boundary edges (5 holes)"
 
 
-def test_the_fox_wears_its_texture_the_right_way_up(data: Path) -> None:
+def test_the_texture_of_the_fox_is_upright(data: Path) -> None:
     fox = load_mesh(data / "anim" / "Fox.glb")
     assert fox.maps.base_color is not None and fox.mesh.corner_uvs is not None
     height, width = fox.maps.base_color.shape[:2]
     u, v = fox.mesh.corner_uvs.mean(axis=1).T
     color = fox.maps.base_color[(v % 1 * height).astype(int), (u % 1 * width).astype(int)]
-    assert (color[:, 0] >= color[:, 2]).mean() > 0.9, "it is red, white and black, and the unused texture is not"
+    assert (color[:, 0] >= color[:, 2]).mean() > 0.9, "the texture is red, white and black"

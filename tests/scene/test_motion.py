@@ -1,4 +1,4 @@
-"""Motion: a rest pose, and bodies that bend without tearing."""
+"""Motions: the rest pose, bending and swelling."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wgsss.scene import shapes
 from wgsss.scene.motion import BendAndSwell
 
 
-def test_rests_at_time_zero_and_after_every_period() -> None:
+def test_a_motion_rests_at_time_zero_and_after_each_period() -> None:
     rest = shapes.capsule(vertices=500).positions
     motion = BendAndSwell(period_s=3)
     for time_s in (0.0, 3.0, 30.0):
@@ -20,7 +20,7 @@ def test_rests_at_time_zero_and_after_every_period() -> None:
     assert np.abs(motion.apply(rest, 0.75) - rest).max() > 10
 
 
-def test_bends_the_axis_into_an_arc_of_the_same_length() -> None:
+def test_bending_keeps_the_length_of_the_axis() -> None:
     axis = np.column_stack([np.zeros(601), np.linspace(0, 60, 601), np.zeros(601)])
     bent = BendAndSwell(bend=90, swell=0, period_s=4).apply(axis, 1.0)
     assert np.linalg.norm(np.diff(bent, axis=0), axis=1).sum() == pytest.approx(60, rel=1e-4)
@@ -29,7 +29,7 @@ def test_bends_the_axis_into_an_arc_of_the_same_length() -> None:
     assert bent[0] == pytest.approx((0, 0, 0))
 
 
-def test_swells_by_no_more_than_it_says() -> None:
+def test_swelling_does_not_exceed_its_parameter() -> None:
     height = np.linspace(0, 60, 200)
     side = np.column_stack([np.zeros(200), height, np.full(200, 9.0)])
     radii = np.array([BendAndSwell(bend=0, swell=0.3).apply(side, t)[:, 2] for t in np.linspace(0, 4, 40)])
@@ -37,7 +37,7 @@ def test_swells_by_no_more_than_it_says() -> None:
     assert radii.min() == pytest.approx(9 * 0.7, rel=0.01)
 
 
-def test_keeps_what_is_inside_inside() -> None:
+def test_a_moving_body_does_not_turn_inside_out() -> None:
     mesh = shapes.capsule(vertices=1000)
     for time_s in np.linspace(0, 4, 9):
         moved = mesh.deformed(BendAndSwell().apply(mesh.positions, time_s))

@@ -1,4 +1,4 @@
-"""Radiance from .hdr and .exr files of every kind, and what makes a sky."""
+"""Radiance from .hdr and .exr files of every kind, and the shapes of skies."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wgsss.scene.images import read_radiance, read_sky
 RGBE = np.random.default_rng(1).integers(128, 256, (6, 12, 4), np.uint8)
 RGBE[..., 3] = 120 + RGBE[..., 3] % 20
 RGBE[2, :, :3] = 177  # a row that consists of runs
-RGBE[3, 4] = (9, 9, 9, 0)  # an exponent of 0 is black, whatever the mantissa
+RGBE[3, 4] = (9, 9, 9, 0)  # an exponent of 0 is black for any mantissa
 EXPECTED = np.where(RGBE[..., 3:] == 0, 0.0, RGBE[..., :3] * 2.0 ** (RGBE[..., 3:].astype(float) - 136))
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -41,7 +41,7 @@ def named(rgb: np.ndarray, layer: str = "", names: str = "RGB") -> dict[str, np.
 
 
 def old_runs(rgbe: np.ndarray) -> bytes:
-    """The old encoding: 1, 1, 1, n repeats the pixel before; in each run that follows, n counts 256 times as much."""
+    """Encode in the old way: 1, 1, 1, n repeats the pixel before; n of each further run has 256 times the weight."""
     flat, out, i = rgbe.reshape(-1, 4), b"", 0
     while i < len(flat):
         n = 1
@@ -62,9 +62,9 @@ def old_runs(rgbe: np.ndarray) -> bytes:
 @pytest.mark.parametrize("data", [run_length(RGBE), RGBE.tobytes(), old_runs(RGBE)], ids=["new", "flat", "old"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_radiance_file(tmp_path: Path, data: bytes, end: str) -> None:
-    found = read(tmp_path / "sky.HDR", hdr(data, end=end))
-    assert found.dtype == np.float32
-    np.testing.assert_allclose(found, EXPECTED, rtol=1e-6)
+    pixels = read(tmp_path / "sky.HDR", hdr(data, end=end))
+    assert pixels.dtype == np.float32
+    np.testing.assert_allclose(pixels, EXPECTED, rtol=1e-6)
 
 
 def test_old_runs_of_more_than_256(tmp_path: Path) -> None:
@@ -72,31 +72,31 @@ def test_old_runs_of_more_than_256(tmp_path: Path) -> None:
     rgbe[:], rgbe[-1, -1] = (200, 130, 7, 128), (255, 1, 2, 129)
     data = old_runs(rgbe)
     assert len(data) == 4 * 4
-    found = read(tmp_path / "sky.hdr", hdr(data, size="-Y 40 +X 80"))
-    assert found[0, 0].tolist() == found[39, 78].tolist() == [200 / 256, 130 / 256, 7 / 256]
-    assert found[39, 79, 0] == 255 / 128
+    pixels = read(tmp_path / "sky.hdr", hdr(data, size="-Y 40 +X 80"))
+    assert pixels[0, 0].tolist() == pixels[39, 78].tolist() == [200 / 256, 130 / 256, 7 / 256]
+    assert pixels[39, 79, 0] == 255 / 128
 
 
 @pytest.mark.parametrize("row", [0, 3])
-def test_flat_pixels_that_look_like_a_run_length_marker(tmp_path: Path, row: int) -> None:
+def test_flat_pixels_may_look_like_a_run_length_marker(tmp_path: Path, row: int) -> None:
     rgbe = RGBE.copy()
     rgbe[row, 0] = (2, 2, 0, 12)
-    found = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes()))
-    np.testing.assert_allclose(found[row, 1:], EXPECTED[row, 1:], rtol=1e-6)
-    np.testing.assert_allclose(found[row, 0], np.array([2, 2, 0]) * 2.0 ** (12 - 136))
+    pixels = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes()))
+    np.testing.assert_allclose(pixels[row, 1:], EXPECTED[row, 1:], rtol=1e-6)
+    np.testing.assert_allclose(pixels[row, 0], np.array([2, 2, 0]) * 2.0 ** (12 - 136))
 
 
 @pytest.mark.parametrize("first", "+-")
 @pytest.mark.parametrize("second", "+-")
 @pytest.mark.parametrize("columns", [False, True])
 def test_orientation(tmp_path: Path, first: str, second: str, columns: bool) -> None:
-    """Lines run along the second axis; +Y first goes up, -X second to the left."""
+    """Lines run along the second axis. With +Y, lines go up; with -X, pixels go to the left."""
     size = f"{first}X 6 {second}Y 12" if columns else f"{first}Y 6 {second}X 12"
-    found = read(tmp_path / "sky.hdr", hdr(run_length(RGBE), size=size))
-    wanted = EXPECTED.transpose(1, 0, 2) if columns else EXPECTED
+    pixels = read(tmp_path / "sky.hdr", hdr(run_length(RGBE), size=size))
+    expected = EXPECTED.transpose(1, 0, 2) if columns else EXPECTED
     x, y = (first, second) if columns else (second, first)
-    wanted = wanted[:: 1 if y == "-" else -1, :: 1 if x == "+" else -1]
-    np.testing.assert_allclose(found, wanted, rtol=1e-6)
+    expected = expected[:: 1 if y == "-" else -1, :: 1 if x == "+" else -1]
+    np.testing.assert_allclose(pixels, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_orientation(tmp_path: Path, first: str, second: str, columns: bool) -> 
     [
         ("EXPOSURE=4\nEXPOSURE= .5\n", 0.5),
         ("EXPOSURE=  2e0 \n# EXPOSURE=9\n", 0.5),
-        ("\tEXPOSURE=7\nVIEW= -vtl\nSOFTWARE=x=y\nCAPDATE=\n", 1.0),  # an indented line tells of another file
+        ("\tEXPOSURE=7\nVIEW= -vtl\nSOFTWARE=x=y\nCAPDATE=\n", 1.0),  # an indented line describes another file
         ("COLORCORR=1 2 4\n", (1, 1 / 2, 1 / 4)),
         ("COLORCORR=1 2 4\nEXPOSURE=2\nCOLORCORR=2 1 1\n", 1 / 4),
         ("GAMMA=1\nPRIMARIES=0 0 0 0 0 0 0 0\n", 1.0),
@@ -114,23 +114,23 @@ def test_orientation(tmp_path: Path, first: str, second: str, columns: bool) -> 
 def test_variables_of_the_header(tmp_path: Path, head: str, factor: Any) -> None:
     if "COLORCORR=2" in head:
         factor = np.array([1 / 4, 1 / 4, 1 / 8])
-    found = read(tmp_path / "sky.hdr", hdr(run_length(RGBE), head))
-    np.testing.assert_allclose(found, EXPECTED * factor, rtol=1e-6)
+    pixels = read(tmp_path / "sky.hdr", hdr(run_length(RGBE), head))
+    np.testing.assert_allclose(pixels, EXPECTED * factor, rtol=1e-6)
 
 
-def test_gamma_is_told(tmp_path: Path) -> None:
+def test_gamma_is_noted(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match=r"sky\.hdr: GAMMA=2\.2 is not applied"):
         read(tmp_path / "sky.hdr", hdr(run_length(RGBE), "GAMMA=2.2\n"))
 
 
 def test_xyz_of_radiance_is_photometric_about_equal_energy(tmp_path: Path) -> None:
-    """179 lm/W; where X = Y = Z, colours are neutral."""
+    """The luminous efficacy is 179 lm/W, and X = Y = Z is neutral."""
     rgbe = np.full((6, 12, 4), (179, 179, 179, 136), np.uint8)
-    found = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes(), "FORMAT=32-bit_rle_xyze\n"))
-    np.testing.assert_allclose(found, 1.0, rtol=2e-4)
-    rgbe[..., 0] = 220  # more X is more red
-    found = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes(), "FORMAT=32-bit_rle_xyze\n"))
-    assert found[0, 0, 0] > 1.5 and found[0, 0, 1] < 1.0
+    pixels = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes(), "FORMAT=32-bit_rle_xyze\n"))
+    np.testing.assert_allclose(pixels, 1.0, rtol=2e-4)
+    rgbe[..., 0] = 220  # a larger X is redder
+    pixels = read(tmp_path / "sky.hdr", hdr(rgbe.tobytes(), "FORMAT=32-bit_rle_xyze\n"))
+    assert pixels[0, 0, 0] > 1.5 and pixels[0, 0, 1] < 1.0
 
 
 def test_other_primaries_keep_white_and_widen_red(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_other_primaries_keep_white_and_widen_red(tmp_path: Path) -> None:
         (hdr(run_length(RGBE)[:60] + b"\0" * 400), "damaged or truncated in row 1 of 6"),
         (hdr(RGBE.tobytes()[:-1]), "truncated: it does not contain the 72 pixels"),
         (hdr(old_runs(RGBE)[:-4]), "truncated"),
-        (hdr(bytes([1, 1, 1, 72]) + RGBE.tobytes()), "truncated"),  # a run of nothing
+        (hdr(bytes([1, 1, 1, 72]) + RGBE.tobytes()), "truncated"),  # a run without a pixel before it
         (hdr(RGBE[0, 0].tobytes() + bytes([1, 1, 1, 255] * 9)), "truncated"),  # a run beyond the image
         (hdr(b"", size="-Y 0 +X 12"), "the image is empty"),
         (hdr(b"", size="-Y 6 +Y 12"), "expected the size of the image"),
@@ -215,7 +215,7 @@ def test_openexr_file(tmp_path: Path, compression: str, dtype: type, tiled: bool
     ],
     ids=lambda channels: " ".join(channels)[:40],
 )
-def test_the_picture_is_found_by_its_name(tmp_path: Path, channels: dict[str, np.ndarray]) -> None:
+def test_the_picture_is_chosen_by_its_layer_name(tmp_path: Path, channels: dict[str, np.ndarray]) -> None:
     np.testing.assert_array_equal(read(tmp_path / "sky.exr", exr(channels)), RGB)
 
 
@@ -232,19 +232,19 @@ def test_the_picture_is_found_by_its_name(tmp_path: Path, channels: dict[str, np
         ({f"n{i:02}.Z": RGB[..., 0] for i in range(20)}, r"n11\.Z, …\)"),
     ],
 )
-def test_a_picture_that_cannot_be_told_is_not_guessed(tmp_path: Path, channels: dict, message: str) -> None:
+def test_an_ambiguous_picture_is_an_error(tmp_path: Path, channels: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read(tmp_path / "sky.exr", exr(channels))
 
 
 def test_luminance_alone_is_grey(tmp_path: Path) -> None:
-    found = read(tmp_path / "sky.exr", exr({"Y": RGB[..., 0], "A": RGB[..., 1]}))
-    np.testing.assert_array_equal(found, RGB[..., :1].repeat(3, axis=2))
+    pixels = read(tmp_path / "sky.exr", exr({"Y": RGB[..., 0], "A": RGB[..., 1]}))
+    np.testing.assert_array_equal(pixels, RGB[..., :1].repeat(3, axis=2))
 
 
 @pytest.mark.parametrize("size", [(4, 8), (6, 12)])
-def test_luminance_and_chroma_are_colours(tmp_path: Path, size: tuple[int, int]) -> None:
-    """Of chroma, every other row and column is kept, those at even places: linear ramps come back but for the rim."""
+def test_luminance_and_chroma_become_colours(tmp_path: Path, size: tuple[int, int]) -> None:
+    """Chroma has values at even rows and columns only. Linear ramps are reproduced except at the border."""
     y, x = np.meshgrid(*(np.arange(n) / n for n in size), indexing="ij")
     RY, BY = 0.5 * x - 0.2, 0.3 * y
     Y = 1.0 + x * y
@@ -252,10 +252,10 @@ def test_luminance_and_chroma_are_colours(tmp_path: Path, size: tuple[int, int])
     green = (Y - 0.2126 * red - 0.0722 * blue) / 0.7152
     channels = {"Y": Y, "RY": RY[::2, ::2], "BY": BY[::2, ::2]}
     content = exr({k: v.astype(np.float32) for k, v in channels.items()}, sampling={"RY": 2, "BY": 2})
-    found = read(tmp_path / "sky.exr", content)
+    pixels = read(tmp_path / "sky.exr", content)
     inner = slice(0, -1), slice(0, -1)
-    np.testing.assert_allclose(found[inner], np.stack([red, green, blue], axis=-1)[inner], rtol=1e-3)
-    assert np.isfinite(found).all()
+    np.testing.assert_allclose(pixels[inner], np.stack([red, green, blue], axis=-1)[inner], rtol=1e-3)
+    assert np.isfinite(pixels).all()
 
 
 def test_xyz_channels_are_converted(tmp_path: Path) -> None:
@@ -266,10 +266,10 @@ def test_xyz_channels_are_converted(tmp_path: Path) -> None:
 
 def test_channels_of_mixed_types(tmp_path: Path) -> None:
     channels = {"R": RGB[..., 0].astype(np.float16), "G": np.full((4, 8), 7, np.uint32), "B": RGB[..., 2]}
-    found = read(tmp_path / "sky.exr", exr(channels))
-    np.testing.assert_array_equal(found[..., 0], channels["R"].astype(np.float32))
-    assert (found[..., 1] == 7).all()
-    np.testing.assert_array_equal(found[..., 2], RGB[..., 2])
+    pixels = read(tmp_path / "sky.exr", exr(channels))
+    np.testing.assert_array_equal(pixels[..., 0], channels["R"].astype(np.float32))
+    assert (pixels[..., 1] == 7).all()
+    np.testing.assert_array_equal(pixels[..., 2], RGB[..., 2])
 
 
 @pytest.mark.parametrize(
@@ -283,16 +283,16 @@ def test_channels_of_mixed_types(tmp_path: Path) -> None:
     ids=["smaller", "shifted", "larger", "beside"],
 )
 def test_a_data_window_is_placed_in_the_display_window(tmp_path: Path, data: Any, display: Any) -> None:
-    found = read(tmp_path / "sky.exr", exr(named(RGB), data=data, display=display))
-    wanted = np.zeros((display[3] - display[1] + 1, display[2] - display[0] + 1, 3), np.float32)
+    pixels = read(tmp_path / "sky.exr", exr(named(RGB), data=data, display=display))
+    expected = np.zeros((display[3] - display[1] + 1, display[2] - display[0] + 1, 3), np.float32)
     for y in range(display[1], display[3] + 1):
         for x in range(display[0], display[2] + 1):
             if data[0] <= x <= data[2] and data[1] <= y <= data[3]:
-                wanted[y - display[1], x - display[0]] = RGB[y - data[1], x - data[0]]
-    np.testing.assert_array_equal(found, wanted)
+                expected[y - display[1], x - display[0]] = RGB[y - data[1], x - data[0]]
+    np.testing.assert_array_equal(pixels, expected)
 
 
-# Published matrices to linear Rec. 709, white adapted by Bradford.
+# Published matrices to linear Rec. 709, with Bradford adaptation.
 @pytest.mark.parametrize(
     ("primaries", "matrix"),
     [
@@ -305,20 +305,20 @@ def test_a_data_window_is_placed_in_the_display_window(tmp_path: Path, data: Any
 )
 def test_chromaticities_are_converted(tmp_path: Path, primaries: tuple[float, ...], matrix: Any) -> None:
     content = exr(named(RGB), attributes=chromaticities(*primaries))
-    wanted = np.maximum(RGB @ np.array(matrix).T, 0.0)
-    np.testing.assert_allclose(read(tmp_path / "sky.exr", content), wanted, atol=2e-3)
+    expected = np.maximum(RGB @ np.array(matrix).T, 0.0)
+    np.testing.assert_allclose(read(tmp_path / "sky.exr", content), expected, atol=2e-3)
 
 
-def test_chromaticities_that_span_nothing_are_refused(tmp_path: Path) -> None:
+def test_degenerate_chromaticities_are_refused(tmp_path: Path) -> None:
     for values in ((0.3,) * 8, (0.0,) * 8, (np.nan,) * 8, (*REC709[:6], 0.3, 0.0)):
         with pytest.raises(InputError, match="do not span a colour space"):
             read(tmp_path / "sky.exr", exr(named(RGB), attributes=chromaticities(*values)))
 
 
-def test_parts_of_a_file(tmp_path: Path) -> None:
+def test_file_partsof_a_file(tmp_path: Path) -> None:
     def write(*parts: tuple[str, dict[str, np.ndarray]]) -> np.ndarray:
-        made = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, channels) for name, channels in parts]
-        with OpenEXR.File(made) as file:
+        file_parts = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, channels) for name, channels in parts]
+        with OpenEXR.File(file_parts) as file:
             file.write(str(tmp_path / "sky.exr"))
         return read_radiance(tmp_path / "sky.exr")
 
@@ -351,7 +351,7 @@ def test_negative_radiance_is_clamped_and_nan_refused(tmp_path: Path) -> None:
         read(tmp_path / "sky.exr", exr(named(rgb)))
 
 
-def test_a_size_is_refused_from_the_header(tmp_path: Path) -> None:
+def test_a_large_image_is_refused_before_decoding(tmp_path: Path) -> None:
     for window in ("data", "display"):
         content = exr(named(RGB), **{"data": (0, 0, 7, 3), window: (0, 0, 99_999, 9)} if window == "display" else {})
         if window == "data":
@@ -363,17 +363,19 @@ def test_a_size_is_refused_from_the_header(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
-def test_a_damaged_openexr_file_is_named_and_nothing_else_printed(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+def test_a_damaged_openexr_file_gives_one_line(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
     file = tmp_path / "sky.exr"
     rgb = np.random.default_rng(2).random((64, 128, 3), np.float32)
-    with OpenEXR.File({"compression": OpenEXR.DWAB_COMPRESSION, "type": OpenEXR.scanlineimage}, {"RGB": rgb}) as made:
-        made.write(str(file))
+    with OpenEXR.File(
+        {"compression": OpenEXR.DWAB_COMPRESSION, "type": OpenEXR.scanlineimage}, {"RGB": rgb}
+    ) as exr_file:
+        exr_file.write(str(file))
     whole = file.read_bytes()
     for content in (whole[: len(whole) // 2], whole[:-20], b"not an image", whole[:2000] + bytes(len(whole) - 2000)):
         file.write_bytes(content)
         with pytest.raises(InputError, match=r"sky\.exr: damaged, or not an OpenEXR file$"):
             read_radiance(file)
-    assert capfd.readouterr() == ("", ""), "what the library prints would end up in --json"
+    assert capfd.readouterr() == ("", ""), "the library prints nothing, which would break --json"
 
 
 # ---- skies
@@ -386,14 +388,14 @@ def test_images_twice_as_wide_as_high_are_skies(tmp_path: Path, size: tuple[int,
 
 
 @pytest.mark.parametrize("size", [(64, 64), (64, 32), (30, 40), (10, 60), (60, 10), (32, 72)])
-def test_other_shapes_are_not(tmp_path: Path, size: tuple[int, int]) -> None:
+def test_images_of_other_shapes_are_not_skies(tmp_path: Path, size: tuple[int, int]) -> None:
     (tmp_path / "sky.exr").write_bytes(exr(named(np.ones((*size, 3), np.float32))))
     with pytest.raises(InputError, match=f"{size[1]} x {size[0]} pixels are not a sky"):
         read_sky(tmp_path / "sky.exr")
 
 
-def test_a_cube_that_says_so_is_turned_to_latitude_and_longitude(tmp_path: Path) -> None:
-    """Its faces +x, -x, +y, -y, +z, -z. The middle of the image is +z, with +x to the left of it: seen from inside."""
+def test_a_cube_is_resampled_to_latitude_and_longitude(tmp_path: Path) -> None:
+    """The faces are +x, -x, +y, -y, +z, -z. The centre of the sky is +z, with +x to its left, as seen from inside."""
     side = 16
     faces = np.zeros((6, side, side, 3), np.float32)
     faces[...] = np.arange(1, 7)[:, None, None, None]
@@ -413,7 +415,7 @@ def test_a_cube_that_says_so_is_turned_to_latitude_and_longitude(tmp_path: Path)
         read_sky(tmp_path / "sky.exr")
 
 
-def test_what_is_no_regular_file_is_refused_unopened(tmp_path: Path) -> None:
+def test_pipes_and_folders_are_refused_unopened(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.hdr")
     (tmp_path / "zero.exr").symlink_to("/dev/zero")
     for name in ("pipe.hdr", "zero.exr"):
@@ -421,13 +423,13 @@ def test_what_is_no_regular_file_is_refused_unopened(tmp_path: Path) -> None:
             read_radiance(tmp_path / name)
 
 
-def test_an_extension_of_the_other_format_does_not_matter(tmp_path: Path) -> None:
+def test_the_extension_of_the_other_format_is_accepted(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path / "sky.hdr", exr(named(RGB))), RGB)
     np.testing.assert_allclose(read(tmp_path / "sky.exr", hdr(run_length(RGBE))), EXPECTED, rtol=1e-6)
 
 
 def test_damaged_bytes_give_one_line_or_a_sky(tmp_path: Path) -> None:
-    """Of 120 files, a few bytes of each of which are other ones, or missing."""
+    """In each of 120 files, a few bytes are changed or missing."""
     rgb = np.random.default_rng(5).random((16, 32, 3), np.float32)
     whole = [(".hdr", hdr(run_length(RGBE), "EXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n")), (".hdr", hdr(old_runs(RGBE)))]
     for name in ("NO", "ZIP", "PIZ", "PXR24", "B44", "DWAA"):
@@ -446,8 +448,8 @@ def test_damaged_bytes_give_one_line_or_a_sky(tmp_path: Path) -> None:
             cut = len(data) if i % 3 else int(random.integers(len(data)))
             (tmp_path / f"sky{extension}").write_bytes(data[:cut])
             try:
-                found = read_sky(tmp_path / f"sky{extension}")
+                pixels = read_sky(tmp_path / f"sky{extension}")
             except InputError as error:
                 assert "\n" not in str(error)
             else:
-                assert np.isfinite(found).all() and found.min() >= 0
+                assert np.isfinite(pixels).all() and pixels.min() >= 0

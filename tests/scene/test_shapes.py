@@ -1,4 +1,4 @@
-"""Shapes by code: closed, of the size, thickness and vertex count that they promise."""
+"""Shapes built by code: closed, with the documented size, thickness and vertex count."""
 
 from __future__ import annotations
 
@@ -62,17 +62,17 @@ def pieces(mesh: Mesh) -> int:
 
 
 def shape_quality(mesh: Mesh) -> np.ndarray:
-    """1 for equilateral triangles, 0 for those without area."""
+    """Compute the quality of triangles: 1 if equilateral, 0 without area."""
     corner = corners(mesh)
     squared = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=(1, 2))
     return 2 * math.sqrt(3) * np.linalg.norm(mesh.face_normals, axis=1) / squared
 
 
 def thickness(mesh: Mesh, faces: np.ndarray) -> np.ndarray:
-    """Distance, mm, from the middle of each of these faces straight through the body to where it ends."""
+    """Compute the distance, mm, from the centre of each face through the body to the opposite side."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     unit = mesh.face_normals / np.linalg.norm(mesh.face_normals, axis=1, keepdims=True)
-    found = []
+    distances = []
     for face in faces:
         origin, direction = (a[face] + b[face] + c[face]) / 3, -unit[face]
         p = np.cross(direction, c - a)
@@ -82,23 +82,23 @@ def thickness(mesh: Mesh, faces: np.ndarray) -> np.ndarray:
             q = np.cross(origin - a, b - a)
             v, along = q @ direction * scale, np.einsum("ij,ij->i", c - a, q) * scale
         hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 1e-3)
-        found.append(along[hit].min())
-    return np.array(found)
+        distances.append(along[hit].min())
+    return np.array(distances)
 
 
 @pytest.mark.parametrize(("name", "count"), EVERY)
 def test_closed_and_wound_outwards(name: str, count: int | None) -> None:
     mesh = make(name, count)
     pairs = edges(mesh).astype(np.int64)
-    there, back = (pairs[:, i] * len(mesh.positions) + pairs[:, 1 - i] for i in (0, 1))
-    assert len(np.unique(there)) == len(there), "an edge has two faces that run along it the same way"
-    assert np.array_equal(np.sort(there), np.sort(back)), "an edge has only one face"
+    forward, back = (pairs[:, i] * len(mesh.positions) + pairs[:, 1 - i] for i in (0, 1))
+    assert len(np.unique(forward)) == len(forward), "an edge has two faces with the same direction"
+    assert np.array_equal(np.sort(forward), np.sort(back)), "an edge has only one face"
     assert len(np.unique(mesh.faces)) == len(mesh.positions) == len(np.unique(mesh.positions, axis=0))
     assert volume(mesh) > 0
-    # Corners of faces at the same vertex, joined across the edge they share: one group, a fan, about each vertex.
+    # Corners of faces at a vertex, connected across shared edges, must form one group (a fan) at each vertex.
     corner = np.arange(len(pairs)).reshape(3, -1)
-    partner = np.argsort(there)[np.searchsorted(np.sort(there), back)]
-    across = np.roll(corner, -1, axis=0).ravel()[partner]  # where the opposite half of the edge ends
+    partner = np.argsort(forward)[np.searchsorted(np.sort(forward), back)]
+    across = np.roll(corner, -1, axis=0).ravel()[partner]  # the end of the opposite half-edge
     graph = coo_array((np.ones(len(pairs)), (corner.ravel(), across)), shape=(len(pairs),) * 2)
     assert connected_components(graph, directed=False)[0] == len(mesh.positions), "faces touch in a single vertex"
 
@@ -134,7 +134,7 @@ def test_slab_is_exact_with_hard_edges() -> None:
 
 
 @pytest.mark.parametrize("size", [(40, 40, 4), (30, 20, 50), (10, 60, 10)])
-def test_slab_charts_are_apart_and_to_scale(size: tuple[float, float, float]) -> None:
+def test_slab_charts_are_separate_and_have_one_scale(size: tuple[float, float, float]) -> None:
     mesh = shapes.slab(size=size, vertices=1000)
     uvs = np.asarray(mesh.corner_uvs, dtype=np.float64)
     (ua, va), (ub, vb), (uc, vc) = uvs.transpose(1, 2, 0)

@@ -1,4 +1,4 @@
-"""Compressed glTF files: decoded where the packages are installed that can, else refused or read uncompressed."""
+"""Compressed glTF files are decoded if the packages are installed; otherwise uncompressed data are read, if any."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DRACO, MESHOPT = "KHR_draco_mesh_compression", ("EXT_meshopt_compression", "KHR_
 
 
 def draco(data: bytes, required: bool, fallback: bool) -> File:
-    """A tetrahedron within Draco's data, uncompressed in accessors of the file too where there is a `fallback`."""
+    """Make a file with a tetrahedron compressed by Draco; with `fallback`, also uncompressed in accessors."""
     file = File()
     primitive = file.primitive()
     for accessor in file.tree["accessors"]:
@@ -33,7 +33,7 @@ def draco(data: bytes, required: bool, fallback: bool) -> File:
 
 
 def meshopt(encoded: bytes, name: str, fallback: bool, **fields: Any) -> File:
-    """A tetrahedron whose positions are in meshopt's data, uncompressed in the file too where there is a `fallback`."""
+    """Make a file with a tetrahedron whose positions meshopt compresses; with `fallback`, also uncompressed."""
     file = File()
     compressed = file.view(encoded)
     packed = {**file.tree["bufferViews"][compressed], "byteStride": 12, "count": 4, "mode": "ATTRIBUTES", **fields}
@@ -59,21 +59,21 @@ def refused(file: File, path: Path) -> str:
 
 
 @pytest.fixture
-def bare(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if no package were installed."""
+def without_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pretend that no package is installed."""
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
 
 
-@pytest.mark.usefixtures("bare")
-def test_without_packages_the_uncompressed_data_are_read(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("without_packages")
+def test_uncompressed_data_are_read_without_the_packages(tmp_path: Path) -> None:
     files = [draco(b"?", False, True), *(meshopt(b"?", name, True) for name in MESHOPT)]
     for file in files:
         contents = read(file, tmp_path)
         assert contents.parts[0].positions.tolist() == TETRAHEDRON.tolist()
 
 
-@pytest.mark.usefixtures("bare")
-def test_without_packages_and_uncompressed_data_the_error_says_what_to_install(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("without_packages")
+def test_the_error_names_the_missing_package_if_there_are_no_uncompressed_data(tmp_path: Path) -> None:
     advice = "to read {}, the package {} is needed (pip install {})"
     message = advice.format(DRACO, "DracoPy", "DracoPy")
     assert refused(draco(b"?", True, True), tmp_path) == message
@@ -83,21 +83,21 @@ def test_without_packages_and_uncompressed_data_the_error_says_what_to_install(t
         assert refused(meshopt(b"?", name, False), tmp_path) == f"buffer view 1: {message}"
 
 
-def test_draco(tmp_path: Path) -> None:
+def test_draco_is_decoded(tmp_path: Path) -> None:
     package = pytest.importorskip("DracoPy")
     data = package.encode(TETRAHEDRON.astype(np.float32), faces=FACES, quantization_bits=16)
     part = read(draco(data, True, False), tmp_path).parts[0]
-    found = sorted(np.round(part.positions[part.faces], 3).reshape(4, 9).tolist())
+    triangles = sorted(np.round(part.positions[part.faces], 3).reshape(4, 9).tolist())
     corners = part.positions[part.faces]
     volume = np.linalg.det(corners).sum() / 6
-    assert len(found) == 4 and volume == pytest.approx(1 / 6, rel=1e-3)
+    assert len(triangles) == 4 and volume == pytest.approx(1 / 6, rel=1e-3)
     for damage in (data[: len(data) // 2], b"?", b""):
         expected = "mesh 0, primitive 0: KHR_draco_mesh_compression: damaged: buffer view 2 cannot be decoded"
         assert refused(draco(damage, True, False), tmp_path) == expected
 
 
 @pytest.mark.parametrize("name", MESHOPT)
-def test_meshopt(tmp_path: Path, name: str) -> None:
+def test_meshopt_is_decoded(tmp_path: Path, name: str) -> None:
     package = pytest.importorskip("meshopt")
     data = package.encode_gltf_buffer(TETRAHEDRON.astype(np.float32), "ATTRIBUTES")
     assert read(meshopt(data, name, False), tmp_path).parts[0].positions.tolist() == TETRAHEDRON.tolist()
@@ -110,7 +110,7 @@ def test_meshopt(tmp_path: Path, name: str) -> None:
         assert refused(meshopt(damage, name, False, **fields), tmp_path) == f"buffer view 1: {name}: {message}"
 
 
-def test_a_claim_of_more_rows_than_its_bytes_can_hold_is_refused_before_it_is_decoded(
+def test_too_many_rows_for_the_bytes_are_refused_before_decoding(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: True)

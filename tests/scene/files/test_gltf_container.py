@@ -1,4 +1,4 @@
-"""The forms of a glTF file, and the data and files that its URIs name."""
+"""The two forms of glTF files, and the data and files that their URIs name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wgsss.scene.files.gltf import read_gltf
 
 
 def refused(path: Path) -> str:
-    """The one line that a file is refused with, without its name."""
+    """Return the error of a file, which must be one line, without the path."""
     with pytest.raises(InputError) as raised:
         read_gltf(path)
     message = str(raised.value)
@@ -24,14 +24,14 @@ def refused(path: Path) -> str:
     return message.removeprefix(f"{path}: ")
 
 
-def test_both_forms_hold_the_same(tmp_path: Path) -> None:
+def test_both_forms_have_the_same_contents(tmp_path: Path) -> None:
     for name in ("box.glb", "box.gltf"):
         contents = read_gltf(File().shown().save(tmp_path / name))
         assert contents.parts[0].positions.tolist() == TETRAHEDRON.tolist()
         assert contents.mm_per_unit == 1000 and contents.states_unit and contents.notes == ()
 
 
-def test_the_content_counts_and_not_the_file_extension(tmp_path: Path) -> None:
+def test_the_form_is_recognised_by_content_not_by_extension(tmp_path: Path) -> None:
     (tmp_path / "box.gltf").write_bytes(File().shown().glb())
     assert len(read_gltf(tmp_path / "box.gltf").parts) == 1
 
@@ -91,7 +91,7 @@ def test_damaged_containers_are_refused(tmp_path: Path) -> None:
         assert message in refused(path)
 
 
-def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
+def test_folders_and_pipes_are_refused(tmp_path: Path) -> None:
     assert refused(tmp_path / "none.glb") == "no such file"
     os.mkfifo(tmp_path / "pipe.glb")
     (tmp_path / "folder.glb").mkdir()
@@ -120,14 +120,14 @@ def test_names_of_files_percent_encoded_or_not(tmp_path: Path, uri: str, name: s
 
 
 @pytest.mark.parametrize("head", ["data:application/octet-stream;base64,", "data:;base64,", "data:any/thing;base64,"])
-def test_data_within_the_text(tmp_path: Path, head: str) -> None:
+def test_data_uris_are_decoded(tmp_path: Path, head: str) -> None:
     file = File().shown()
     text = base64.b64encode(bytes(file.data)).decode().rstrip("=").replace("+", "%2B")
     file.tree["buffers"] = [{"byteLength": len(file.data), "uri": head + text[:40] + "\n" + text[40:]}]
     assert read_gltf(file.save(tmp_path / "box.gltf")).parts[0].positions.tolist() == TETRAHEDRON.tolist()
 
 
-def test_data_that_are_not_there_are_an_error_that_names_the_buffer(tmp_path: Path) -> None:
+def test_missing_data_are_an_error_that_names_the_buffer(tmp_path: Path) -> None:
     file = File().shown()
     path = file.save(tmp_path / "box.gltf")
     os.mkfifo(tmp_path / "pipe")
@@ -148,7 +148,7 @@ def test_data_that_are_not_there_are_an_error_that_names_the_buffer(tmp_path: Pa
         assert refused(path) == message
 
 
-def test_an_image_that_is_not_there_is_left_out_with_a_note(tmp_path: Path) -> None:
+def test_a_missing_image_is_left_out_with_a_note(tmp_path: Path) -> None:
     file = File()
     (tmp_path / "my map.png").write_bytes(png())
     for uri in ("my%20map.png", "gone%20.png", "data:image/png;base64,??", "data:image/png;base64,"):
@@ -163,12 +163,12 @@ def test_an_image_that_is_not_there_is_left_out_with_a_note(tmp_path: Path) -> N
     )
 
 
-def test_only_the_buffers_that_are_used_must_be_there(tmp_path: Path) -> None:
+def test_unused_buffers_may_be_missing(tmp_path: Path) -> None:
     file = File().shown()
     file.tree["buffers"] = [{"byteLength": len(file.data)}, {"byteLength": 9, "uri": "none.bin"}]
     assert len(read_gltf(file.save(tmp_path / "box.glb")).parts) == 1
 
 
-def test_arrays_are_plain(tmp_path: Path) -> None:
+def test_arrays_have_standard_types(tmp_path: Path) -> None:
     part = read_gltf(File().shown().save(tmp_path / "box.glb")).parts[0]
     assert (part.positions.dtype, part.faces.dtype, part.uvs[0].dtype) == (np.float64, np.int64, np.float64)

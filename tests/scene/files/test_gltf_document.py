@@ -1,4 +1,4 @@
-"""Accessors: every kind of number, however it is stored, and none that is not there."""
+"""Accessors: every type of number in every storage, and errors for data that are missing."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def document(file: File, path: Path) -> Document:
 
 @pytest.mark.parametrize("dtype", CODES)
 @pytest.mark.parametrize("normalized", [False, True])
-def test_every_type_of_number_plain_and_normalised(tmp_path: Path, dtype: str, normalized: bool) -> None:
+def test_every_component_type_plain_and_normalised(tmp_path: Path, dtype: str, normalized: bool) -> None:
     file = File()
     low, high = (-7.5, 1e30) if dtype == "f4" else (np.iinfo(dtype).min, np.iinfo(dtype).max)
     index = file.rows([(low, high), (0, 1)], "VEC2", dtype, normalized=normalized)
-    found = document(file, tmp_path).numbers(index, "VEC2", "it")
+    values = document(file, tmp_path).numbers(index, "VEC2", "it")
     if dtype == "f4":
-        assert found == pytest.approx(np.array([(low, high), (0, 1)]))
+        assert values == pytest.approx(np.array([(low, high), (0, 1)]))
     elif normalized:
-        assert found == pytest.approx(np.array([(-1 if low else 0, 1), (0, 1 / high)]))
+        assert values == pytest.approx(np.array([(-1 if low else 0, 1), (0, 1 / high)]))
     else:
-        assert found.dtype == np.int64 and found.tolist() == [[low, high], [0, 1]]
+        assert values.dtype == np.int64 and values.tolist() == [[low, high], [0, 1]]
 
 
 def test_rows_with_a_stride_and_an_offset(tmp_path: Path) -> None:
@@ -128,11 +128,11 @@ def test_a_bad_accessor_is_named(tmp_path: Path, name: str) -> None:
     file.rows(np.ones((4, 3)), "VEC3")
     file.view([200, 0], "u1")
     file.tree["accessors"][0].update(change)
-    found = document(file, tmp_path)
+    opened = document(file, tmp_path)
     tracemalloc.start()
     with pytest.raises(InputError) as raised:
-        found.numbers(0, "VEC3", "it")
-    assert tracemalloc.get_traced_memory()[1] < 1e6, "nothing was made room for"
+        opened.numbers(0, "VEC3", "it")
+    assert tracemalloc.get_traced_memory()[1] < 1e6, "no memory was allocated"
     tracemalloc.stop()
     assert str(raised.value) == message
 
@@ -166,10 +166,10 @@ def test_a_bad_buffer_view_is_named(tmp_path: Path, name: str) -> None:
     assert str(raised.value) == message
 
 
-def test_what_is_asked_for_must_be_there(tmp_path: Path) -> None:
+def test_kind_count_and_index_must_match(tmp_path: Path) -> None:
     file = File()
     file.rows([(1, 2, np.nan)], "VEC3")
-    found = document(file, tmp_path)
+    opened = document(file, tmp_path)
     for index, options, message in (
         (1, {}, "it: there is no accessor 1"),
         (-1, {}, "it: there is no accessor -1"),
@@ -180,6 +180,6 @@ def test_what_is_asked_for_must_be_there(tmp_path: Path) -> None:
         (0, {}, "it: accessor 0 holds a number that is not finite"),
     ):
         with pytest.raises(InputError) as raised:
-            found.numbers(index, "VEC3", "it", **options)
+            opened.numbers(index, "VEC3", "it", **options)
         assert str(raised.value) == message
-    assert np.isnan(found.numbers(0, "VEC3", "it", finite=False)).sum() == 1
+    assert np.isnan(opened.numbers(0, "VEC3", "it", finite=False)).sum() == 1

@@ -1,4 +1,4 @@
-"""Damaged glTF files: whatever is in them, they are read or refused in one line that names them."""
+"""Damaged glTF files are read, or refused in one line that names them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wgsss.errors import InputError
 from wgsss.scene.files.contents import Contents
 from wgsss.scene.files.gltf import read_gltf
 
-SEED, COUNT = 15, 25  # of each file, changed in its JSON and in its bytes
+SEED, COUNT = 15, 25  # number of changes of the JSON, and of the bytes, of each file
 MEMORY = 64e6
 """bytes that no file of a few thousand may take"""
 
@@ -30,7 +30,7 @@ STRANGE: tuple[Any, ...] = (
 
 
 def plain() -> File:
-    """Textures, colours, strips, sparse accessors and a material with all that is read."""
+    """Make a file with textures, colours, strips, sparse accessors and a material with all properties that are read."""
     file = File()
     for _ in range(2):
         file.add("textures", source=file.add("images", bufferView=file.view(png()), mimeType="image/png"), sampler=0)
@@ -72,7 +72,7 @@ def plain() -> File:
 
 
 def moving() -> File:
-    """A skin, morph targets, instances, an animation, lights and a camera."""
+    """Make a file with a skin, morph targets, instances, an animation, lights and a camera."""
     file = File()
     attributes = {
         "JOINTS_0": file.rows(np.zeros((4, 4)), "VEC4", "u1"),
@@ -101,7 +101,7 @@ def moving() -> File:
 
 
 def places(tree: Any) -> Iterator[tuple[Any, Any]]:
-    """All containers within a tree, with each of their keys."""
+    """Yield all containers in a tree, with each of their keys."""
     for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
         yield tree, key
         if isinstance(value, dict | list):
@@ -109,16 +109,16 @@ def places(tree: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def change_json(file: File, dice: random.Random) -> bytes:
-    """The file with up to three values replaced, removed or moved."""
+    """Replace, remove or move up to three values of the JSON."""
     changed = copy.deepcopy(file)
     for _ in range(dice.randint(1, 3)):
-        found = list(places(changed.tree))
-        container, key = dice.choice(found)
+        fields = list(places(changed.tree))
+        container, key = dice.choice(fields)
         kind = dice.random()
         if kind < 0.75:
             container[key] = dice.choice(STRANGE)
         elif kind < 0.9:
-            other, place = dice.choice(found)
+            other, place = dice.choice(fields)
             container[key] = copy.deepcopy(other[place])
         else:
             del container[key]
@@ -126,7 +126,7 @@ def change_json(file: File, dice: random.Random) -> bytes:
 
 
 def change_bytes(file: File, dice: random.Random) -> bytes:
-    """The file with some bytes changed, cut off or put in."""
+    """Change, cut off or insert some bytes."""
     data = bytearray(file.glb())
     for _ in range(dice.choice((1, 3, 30))):
         data[dice.randrange(len(data))] = dice.randrange(256)
@@ -141,7 +141,7 @@ def change_bytes(file: File, dice: random.Random) -> bytes:
 
 
 def use(contents: Contents) -> None:
-    """Whatever a reader of the contents would look at."""
+    """Access all contents, as a caller of the reader would."""
     assert contents.parts and all("\n" not in note for note in contents.notes)
     for part in contents.parts:
         assert part.faces.shape[1:] == (3,) and len(part.faces)
@@ -177,16 +177,16 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(
         except InputError as error:
             message = str(error)
             assert message.startswith(f"{path}: ") and "\n" not in message and message.isprintable()
-            assert "it cannot be read (" not in message, "somebody should have foreseen this"
+            assert "it cannot be read (" not in message, "the error is specific"
             outcomes.append(message)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < MEMORY
-    assert any(outcomes) and len(set(outcomes)) > 5, "the changes do something"
+    assert any(outcomes) and len(set(outcomes)) > 5, "some files are refused"
 
 
 def test_every_value_may_be_of_a_wrong_type(tmp_path: Path) -> None:
-    """Each value of a file in turn, by one that is drawn for it."""
+    """Each value of a file in turn is replaced by a random one."""
     dice, path = random.Random(SEED), tmp_path / "damaged.gltf"
     for file in (plain(), moving()):
         file.save(path)

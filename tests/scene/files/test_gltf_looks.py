@@ -1,4 +1,4 @@
-"""The materials and textures of a glTF file, and what is said of what they have that is not used."""
+"""Materials and textures of glTF files, and notes on properties that are not used."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def refused(file: File, path: Path) -> str:
 
 
 def textured(count: int = 1, **texture: Any) -> File:
-    """A file with so many textures of an image of its own each."""
+    """Make a file with a number of textures, each with its own image."""
     file = File()
     for number in range(count):
         image = file.add("images", bufferView=file.view(png(((number, 0, 0),))), mimeType="image/png")
@@ -41,7 +41,7 @@ def textured(count: int = 1, **texture: Any) -> File:
 # --- values ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_material_that_says_nothing_leaves_all_open(tmp_path: Path) -> None:
+def test_an_empty_material_defines_nothing(tmp_path: Path) -> None:
     assert look(tmp_path) == Look()
     assert look(tmp_path, pbrMetallicRoughness={"metallicFactor": 0}) == Look()
     file = File()
@@ -49,20 +49,20 @@ def test_a_material_that_says_nothing_leaves_all_open(tmp_path: Path) -> None:
     assert read(file, tmp_path).parts[0].look == Look()
 
 
-def test_what_it_says(tmp_path: Path) -> None:
-    found = look(
+def test_a_material_defines_its_look(tmp_path: Path) -> None:
+    result = look(
         tmp_path,
         name="skin\n1",
         pbrMetallicRoughness={"baseColorFactor": [0.5, 0.25, 1, 0.75], "roughnessFactor": 0},
         extensions={"KHR_materials_ior": {"ior": 1.4}, "KHR_materials_specular": {"specularFactor": 0.5}},
     )
     expected = Look("skin 1", (0.5, 0.25, 1.0), roughness=0.0, eta=1.4, specular=0.5)
-    assert found == expected
+    assert result == expected
 
 
 def test_defaults_of_extensions(tmp_path: Path) -> None:
-    found = look(tmp_path, extensions={"KHR_materials_ior": {}, "KHR_materials_specular": {}})
-    assert (found.eta, found.specular) == (1.5, 1.0)
+    result = look(tmp_path, extensions={"KHR_materials_ior": {}, "KHR_materials_specular": {}})
+    assert (result.eta, result.specular) == (1.5, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -75,14 +75,14 @@ def test_defaults_of_extensions(tmp_path: Path) -> None:
         ({"alphaMode": "BLEND"}, 1, None),
     ],
 )
-def test_alpha_matters_where_the_mode_is_mask(
+def test_alpha_is_used_in_mode_mask(
     tmp_path: Path, material: dict[str, Any], alpha: float, cutoff: float | None
 ) -> None:
-    found = look(tmp_path, pbrMetallicRoughness={"baseColorFactor": [1, 1, 1, 0.8]}, **material)
-    assert (found.alpha, found.cutoff) == (alpha, cutoff)
+    result = look(tmp_path, pbrMetallicRoughness={"baseColorFactor": [1, 1, 1, 0.8]}, **material)
+    assert (result.alpha, result.cutoff) == (alpha, cutoff)
 
 
-def test_each_loss_is_one_line_that_counts_its_materials(tmp_path: Path) -> None:
+def test_each_loss_is_one_note_that_counts_materials(tmp_path: Path) -> None:
     file, lossy = File(), textured()
     shiny = {"metallicFactor": 1, "metallicRoughnessTexture": {"index": 0}, "baseColorFactor": [2, 0, 0, 1]}
     for _ in range(2):
@@ -120,18 +120,18 @@ def test_each_loss_is_one_line_that_counts_its_materials(tmp_path: Path) -> None
     assert read(file, tmp_path).notes == (), "emission is black without its factor"
 
 
-def test_materials_that_nothing_wears_do_not_matter(tmp_path: Path) -> None:
+def test_unused_materials_are_not_noted(tmp_path: Path) -> None:
     file = File().shown()
     file.add("materials", alphaMode="BLEND", normalTexture={"index": 9})
     assert read(file, tmp_path).notes == ()
 
 
-def test_specular_glossiness_gives_its_diffuse_colour(tmp_path: Path) -> None:
+def test_specular_glossiness_gives_the_diffuse_colour(tmp_path: Path) -> None:
     file = textured()
     glossy = {"diffuseFactor": [0.5, 0.5, 0.25, 1], "diffuseTexture": {"index": 0}, "glossinessFactor": 0.5}
     contents = read(file.shown(extensions={"KHR_materials_pbrSpecularGlossiness": glossy}), tmp_path)
-    found = contents.parts[0].look
-    assert found.base_color == (0.5, 0.5, 0.25) and found.base_color_map is not None
+    result = contents.parts[0].look
+    assert result.base_color == (0.5, 0.5, 0.25) and result.base_color_map is not None
     assert contents.notes == (
         "all but the diffuse colour of KHR_materials_pbrSpecularGlossiness left out: used by 1 material",
     )
@@ -140,7 +140,7 @@ def test_specular_glossiness_gives_its_diffuse_colour(tmp_path: Path) -> None:
 # --- textures --------------------------------------------------------------------------------------------------------
 
 
-def test_textures_are_found_and_not_decoded(tmp_path: Path) -> None:
+def test_images_of_textures_are_not_decoded(tmp_path: Path) -> None:
     file = textured(3)
     file.tree["images"][1]["name"] = "bumps"
     contents = read(
@@ -151,10 +151,10 @@ def test_textures_are_found_and_not_decoded(tmp_path: Path) -> None:
         ),
         tmp_path,
     )
-    found = contents.parts[0].look
-    assert found.base_color_map == Texture(png(((0, 0, 0),)), "image 0")
-    assert found.normal_map == Texture(png(((1, 0, 0),)), "image 1 (bumps)") and found.normal_scale == -0.5
-    assert found.specular_map == Texture(png(((2, 0, 0),)), "image 2", channels="A")
+    result = contents.parts[0].look
+    assert result.base_color_map == Texture(png(((0, 0, 0),)), "image 0")
+    assert result.normal_map == Texture(png(((1, 0, 0),)), "image 1 (bumps)") and result.normal_scale == -0.5
+    assert result.specular_map == Texture(png(((2, 0, 0),)), "image 2", channels="A")
     assert contents.notes == ()
 
 
@@ -169,23 +169,23 @@ def test_textures_are_found_and_not_decoded(tmp_path: Path) -> None:
 def test_samplers(tmp_path: Path, sampler: dict[str, int], wrap: tuple[str, str], nearest: bool) -> None:
     file = textured(sampler=0)
     file.add("samplers", **sampler)
-    found = read(file.shown(normalTexture={"index": 0}), tmp_path).parts[0].look.normal_map
-    assert found is not None and (found.wrap, found.nearest) == (wrap, nearest)
+    texture = read(file.shown(normalTexture={"index": 0}), tmp_path).parts[0].look.normal_map
+    assert texture is not None and (texture.wrap, texture.nearest) == (wrap, nearest)
 
 
-def test_a_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
-    """As the specification words it: the coordinates turn counter-clockwise, seen with v pointing down."""
+def test_a_texture_transform_scales_rotates_and_shifts(tmp_path: Path) -> None:
+    """As the specification defines, coordinates rotate counter-clockwise if v points down."""
     transform = {"scale": [2, 3], "rotation": math.pi / 2, "offset": [10, 20], "texCoord": 0}
     info = {"index": 0, "texCoord": 7, "extensions": {"KHR_texture_transform": transform}}
-    found = read(textured().shown(normalTexture=info), tmp_path).parts[0].look.normal_map
-    assert found is not None and found.transform is not None and found.coordinates == 0
-    matrix = np.array(found.transform)
+    texture = read(textured().shown(normalTexture=info), tmp_path).parts[0].look.normal_map
+    assert texture is not None and texture.transform is not None and texture.coordinates == 0
+    matrix = np.array(texture.transform)
     assert matrix @ (0, 0, 1) == pytest.approx((10, 20))
-    assert matrix @ (1, 0, 1) == pytest.approx((10, 18)), "along u, to the right, becomes up"
-    assert matrix @ (0, 1, 1) == pytest.approx((13, 20)), "along v, down, becomes right"
+    assert matrix @ (1, 0, 1) == pytest.approx((10, 18)), "u, to the right, becomes up"
+    assert matrix @ (0, 1, 1) == pytest.approx((13, 20)), "v, down, becomes right"
 
 
-def test_a_texture_over_coordinates_that_are_not_there_is_left_out(tmp_path: Path) -> None:
+def test_a_texture_without_its_coordinates_is_left_out(tmp_path: Path) -> None:
     file = textured()
     uvs = file.rows(TETRAHEDRON[:, :2], "VEC2")
     number = file.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0, "texCoord": 1}})
@@ -214,7 +214,7 @@ def test_images_in_formats_of_extensions(tmp_path: Path) -> None:
         file.shown(normalTexture={"index": number})
     contents = read(file, tmp_path)
     maps = [part.look.normal_map for part in contents.parts]
-    assert [found and found.name for found in maps] == ["image 1", "image 0", "image 0", None, None]
+    assert [texture and texture.name for texture in maps] == ["image 1", "image 0", "image 0", None, None]
     assert contents.notes == (
         "texture 5 left out: it has no image that can be read (it uses KHR_texture_basisu)",
         "texture 6 left out: it has no image that can be read",
@@ -273,7 +273,7 @@ def test_a_bad_material_is_named(tmp_path: Path, material: dict[str, Any], messa
 # --- extensions ------------------------------------------------------------------------------------------------------
 
 
-def test_a_required_extension_that_is_not_known_is_refused_by_name(tmp_path: Path) -> None:
+def test_an_unknown_required_extension_is_refused_by_name(tmp_path: Path) -> None:
     file = File().shown()
     file.tree["extensionsRequired"] = ["KHR_texture_transform", "VENDOR_unknown", "KHR_materials_clearcoat"]
     message = "it requires VENDOR_unknown, KHR_materials_clearcoat, which cannot be read"
@@ -286,7 +286,7 @@ def test_a_required_extension_that_is_not_known_is_refused_by_name(tmp_path: Pat
         assert refused(file, tmp_path) == message
 
 
-def test_optional_extensions_are_named_where_something_uses_them(tmp_path: Path) -> None:
+def test_optional_extensions_in_use_are_noted(tmp_path: Path) -> None:
     file = File().shown()
     file.tree["extensionsUsed"] = ["VENDOR_a", "VENDOR_b", "VENDOR_c", "KHR_xmp_json_ld"]
     file.tree["extensions"] = {"VENDOR_a": {"extensions": {"VENDOR_b": {}}}, "KHR_xmp_json_ld": {}}

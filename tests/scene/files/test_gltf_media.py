@@ -1,4 +1,4 @@
-"""The medium of a glTF material: coefficients of its extensions, and back."""
+"""The medium of a glTF material: coefficients from extensions, and extensions from coefficients."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ def read(path: Path, file: File | None = None, **extensions: Any) -> Contents:
     return read_gltf(file.save(path / "wax.glb"))
 
 
-def test_by_the_formula_of_kulla_and_conty() -> None:
-    found = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
-    assert found is not None
+def test_coefficients_follow_kulla_and_conty() -> None:
+    result = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
+    assert result is not None
     for channel in range(3):
         r, sigma_t = COLOR[channel], -math.log(WAX["attenuationColor"][channel]) / 0.01  # type: ignore[index]
         albedo = 1 - (4.09712 + 4.20863 * r - math.sqrt(9.59217 + 41.6808 * r + 17.7126 * r * r)) ** 2
-        assert found.sigma_s_prime[channel] == pytest.approx(sigma_t * albedo)
-        assert found.sigma_a[channel] == pytest.approx(sigma_t * (1 - albedo))
+        assert result.sigma_s_prime[channel] == pytest.approx(sigma_t * albedo)
+        assert result.sigma_a[channel] == pytest.approx(sigma_t * (1 - albedo))
 
 
-def test_all_spellings_of_the_drafts_say_the_same() -> None:
+def test_all_spellings_of_the_drafts_are_equivalent() -> None:
     expected = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
     for extension in (
         {OLD: {"multiscatterColorFactor": COLOR}},
@@ -60,13 +60,13 @@ def test_all_spellings_of_the_drafts_say_the_same() -> None:
     assert white is not None and white.sigma_a == (0, 0, 0)
 
 
-def test_anisotropy_lessens_scattering_and_keeps_the_colour() -> None:
-    """The reduced albedo, sigma_s' / (sigma_s' + sigma_a), is what decides the colour after many events."""
+def test_anisotropy_reduces_scattering_and_keeps_the_colour() -> None:
+    """The reduced albedo sigma_s' / (sigma_s' + sigma_a) determines the colour after many scattering events."""
     plain = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR}})
     forward = medium({VOLUME: WAX, OLD: {"multiscatterColor": COLOR, "scatterAnisotropy": 0.8}})
     assert plain is not None and forward is not None
-    for one in (plain, forward):
-        share = np.array(one.sigma_s_prime) / (np.array(one.sigma_s_prime) + one.sigma_a)
+    for result in (plain, forward):
+        share = np.array(result.sigma_s_prime) / (np.array(result.sigma_s_prime) + result.sigma_a)
         s = (
             4.09712
             + 4.20863 * np.array(COLOR)
@@ -93,7 +93,7 @@ def test_anisotropy_lessens_scattering_and_keeps_the_colour() -> None:
         ),
     ],
 )
-def test_where_nothing_scatters_there_is_no_medium_and_a_note(extensions: dict[str, Any], note: str) -> None:
+def test_a_medium_without_scattering_is_none_with_a_note(extensions: dict[str, Any], note: str) -> None:
     notes = Notes()
     assert medium(extensions, notes) is None
     assert len(notes.lines()) == 1 and notes.lines()[0].startswith(note)
@@ -103,12 +103,12 @@ def test_where_nothing_scatters_there_is_no_medium_and_a_note(extensions: dict[s
 @pytest.mark.parametrize("color", [[0, 0, 0], [0, 0.5, 1], [1e-300, 1 - 1e-16, 0.5]])
 @pytest.mark.parametrize("scatter", [[0, 0, 1], [1e-300, 1, 0.5], [2, -1, 1]])
 @pytest.mark.parametrize("g", [-1, 0, 1, 7])
-def test_no_values_give_numbers_that_are_not_finite(distance: float, color: Any, scatter: Any, g: float) -> None:
+def test_coefficients_are_always_finite(distance: float, color: Any, scatter: Any, g: float) -> None:
     volume = {"attenuationDistance": distance, "attenuationColor": color}
-    found = medium({VOLUME: volume, OLD: {"multiscatterColor": scatter, "scatterAnisotropy": g}})
-    assert found is not None
-    assert all(0 <= value <= 1e9 for value in found.sigma_a) and all(
-        1e-3 <= value <= 1e9 for value in found.sigma_s_prime
+    result = medium({VOLUME: volume, OLD: {"multiscatterColor": scatter, "scatterAnisotropy": g}})
+    assert result is not None
+    assert all(0 <= value <= 1e9 for value in result.sigma_a) and all(
+        1e-3 <= value <= 1e9 for value in result.sigma_s_prime
     )
 
 
@@ -120,20 +120,20 @@ def test_textures_of_a_medium_are_noted() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, material in MATERIALS.items() if material.sigma_a is not None])
-def test_what_is_written_is_read_again(name: str) -> None:
+def test_written_coefficients_are_read_again(name: str) -> None:
     material = MATERIALS[name]
     sigma_a, sigma_s = np.array(material.sigma_a) * 1000, np.array(material.sigma_s_prime) * 1000
     volume, scatter = written(sigma_a, sigma_s)
-    found = medium({VOLUME: volume, OLD: scatter})
-    assert found is not None
-    assert found.sigma_a == pytest.approx(sigma_a, rel=1e-9)
-    assert found.sigma_s_prime == pytest.approx(sigma_s, rel=1e-9)
+    result = medium({VOLUME: volume, OLD: scatter})
+    assert result is not None
+    assert result.sigma_a == pytest.approx(sigma_a, rel=1e-9)
+    assert result.sigma_s_prime == pytest.approx(sigma_s, rel=1e-9)
 
 
 # --- the boundary ----------------------------------------------------------------------------------------------------
 
 
-def test_a_medium_makes_the_eta_of_gltf_count(tmp_path: Path) -> None:
+def test_a_material_with_a_medium_has_the_default_eta_of_gltf(tmp_path: Path) -> None:
     assert read(tmp_path).parts[0].look.eta == 1.5
     assert read(tmp_path, KHR_materials_ior={"ior": 1.4}).parts[0].look.eta == 1.4
 
@@ -148,7 +148,7 @@ def test_a_medium_makes_the_eta_of_gltf_count(tmp_path: Path) -> None:
         ({"diffuseTransmissionFactor": 0.25}, (0.4, 0.55, 0.85)),
     ],
 )
-def test_what_diffuse_transmission_lets_through_colours_the_surface(
+def test_diffuse_transmission_colours_the_surface(
     tmp_path: Path, diffuse: dict[str, Any] | None, color: tuple[float, ...]
 ) -> None:
     contents = read(tmp_path, **({} if diffuse is None else {DIFFUSE: diffuse}))
@@ -156,13 +156,13 @@ def test_what_diffuse_transmission_lets_through_colours_the_surface(
 
 
 @pytest.mark.parametrize(("share", "name"), [(1.0, "image 0"), (0.7, "image 0"), (0.3, None)])
-def test_of_two_maps_that_of_the_larger_share_is_taken(tmp_path: Path, share: float, name: str | None) -> None:
+def test_the_map_with_the_larger_share_is_used(tmp_path: Path, share: float, name: str | None) -> None:
     file = File()
     file.add("textures", source=file.add("images", bufferView=file.view(png())))
     diffuse = {"diffuseTransmissionFactor": share, "diffuseTransmissionColorTexture": {"index": 0}}
     contents = read(tmp_path, file, **{DIFFUSE: diffuse})
-    found = contents.parts[0].look.base_color_map
-    assert (found and found.name) == name
+    texture = contents.parts[0].look.base_color_map
+    assert (texture and texture.name) == name
     rounded = f"diffuseTransmissionFactor of {DIFFUSE} rounded to {round(share)}: used by 1 material"
     assert contents.notes == (() if share == 1 else (rounded,))
 

@@ -1,4 +1,4 @@
-"""Which triangles a glTF file shows, and where: primitives, nodes, scenes and instances."""
+"""The triangles that a glTF file shows, and their places: primitives, nodes, scenes and instances."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def refused(file: File, path: Path) -> str:
 
 
 def placed(part: Part) -> Array:
-    """The positions of a part in the space of the file."""
+    """Return the positions of a part in the space of the file."""
     return part.positions @ part.matrix[:3, :3].T + part.matrix[:3, 3]
 
 
@@ -51,7 +51,7 @@ def test_strips_and_fans(tmp_path: Path, mode: int, expected: Any, dtype: str | 
     assert read(file, tmp_path).parts[0].faces.tolist() == [list(face) for face in expected]
 
 
-def test_triangles_of_a_strip_that_only_stitch_it_are_left_out(tmp_path: Path) -> None:
+def test_degenerate_triangles_that_join_strips_are_left_out(tmp_path: Path) -> None:
     file = File()
     file.node(mesh=file.mesh(file.primitive(PENTAGON, (0, 1, 2, 2, 3, 3, 4, 1), mode=5)))
     contents = read(file, tmp_path)
@@ -175,7 +175,7 @@ def test_numbers_that_are_not_finite(tmp_path: Path) -> None:
     assert refused(file, tmp_path) == message
 
 
-def test_primitives_that_share_many_vertices_keep_their_own(tmp_path: Path) -> None:
+def test_primitives_keep_only_the_shared_vertices_that_they_use(tmp_path: Path) -> None:
     file = File()
     shared = file.rows(np.concatenate([np.full((9, 3), 5.0), TETRAHEDRON, np.full((9, 3), 6.0)]), "VEC3")
     uvs = file.rows(np.arange(44).reshape(22, 2), "VEC2")
@@ -205,7 +205,7 @@ def test_a_mesh_is_placed_by_each_of_its_nodes(tmp_path: Path) -> None:
     assert plain.positions is mirrored.positions and np.linalg.det(mirrored.matrix) < 0
 
 
-def test_only_what_the_scene_shows(tmp_path: Path) -> None:
+def test_only_nodes_of_the_scene_are_shown(tmp_path: Path) -> None:
     file = File()
     for number in range(4):
         file.node(mesh=file.mesh(), translation=[number, 0, 0], root=False)
@@ -222,7 +222,7 @@ def test_only_what_the_scene_shows(tmp_path: Path) -> None:
     assert shown == {0: [3, 1, 3], 1: [0], 2: [0, 1, 3, 3]}, "each node once, below its parent"
 
 
-def test_hidden_nodes_and_what_is_below_them(tmp_path: Path) -> None:
+def test_hidden_nodes_and_their_children_are_left_out(tmp_path: Path) -> None:
     file = File()
     for number in range(4):
         file.node(mesh=file.mesh(), translation=[number, 0, 0], root=number < 2)
@@ -324,7 +324,7 @@ def test_bad_instances_are_named(tmp_path: Path) -> None:
         assert refused(file, tmp_path) == f"node 0: EXT_mesh_gpu_instancing: {message}"
 
 
-def test_a_few_bytes_cannot_ask_for_more_than_memory_holds(tmp_path: Path) -> None:
+def test_a_small_file_cannot_request_too_many_triangles(tmp_path: Path) -> None:
     file = File()
     zeros = file.add("accessors", count=1_000_000, componentType=5126, type="VEC3")
     file.node(mesh=file.mesh(), extensions={"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": zeros}}})

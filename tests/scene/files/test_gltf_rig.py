@@ -1,4 +1,4 @@
-"""What moves the parts of a glTF file: skins, morph targets and animations, against values worked out by hand."""
+"""Skins, morph targets and animations of glTF files, against values computed by hand."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ COUNTS = {"rotation": "VEC4", "weights": "SCALAR"}
 
 
 def animate(file: File, *channels: tuple[int, str, Any, Any], kind: str | None = None, name: Any = None) -> None:
-    """An animation of channels: node, path, times and values."""
-    samplers, found = [], []
+    """Add an animation to a file. A channel is node, path, times and values."""
+    samplers, targets = [], []
     for node, path, times, values in channels:
         rows = np.ravel(values) if path == "weights" else values
         sampler = {"input": file.rows(times, "SCALAR"), "output": file.rows(rows, COUNTS.get(path, "VEC3"))}
-        found.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        targets.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         samplers.append(sampler | ({} if kind is None else {"interpolation": kind}))
-    file.add("animations", samplers=samplers, channels=found, **({} if name is None else {"name": name}))
+    file.add("animations", samplers=samplers, channels=targets, **({} if name is None else {"name": name}))
 
 
 def skinned(joints: str = "u1", weights: str = "f4") -> File:
-    """A tetrahedron of which all but the origin hangs on the second of two joints, which stands at x = 1."""
+    """Make a tetrahedron with two joints. All vertices except the origin follow the second joint, at x = 1."""
     file = File()
     top = {"f4": 1, "u1": 255, "u2": 65535}[weights]
     share = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 1, 0, 0), (0.5, 0.5, 0, 0)])
@@ -60,7 +60,7 @@ def read(file: File, path: Path) -> Contents:
 
 
 def posed(contents: Contents, name: str, time_s: float) -> Array:
-    """The vertices of all parts at a time of an animation."""
+    """Return the positions of all parts at a time of an animation."""
     assert contents.rig is not None
     pose = contents.rig.nodes.rest.copy()
     for channel in contents.animations[name]():
@@ -73,13 +73,13 @@ def posed(contents: Contents, name: str, time_s: float) -> Array:
 
 @pytest.mark.parametrize("joints", ["u1", "u2"])
 @pytest.mark.parametrize("weights", ["f4", "u1", "u2"])
-def test_joints_carry_a_skin_wherever_its_node_is(tmp_path: Path, joints: str, weights: str) -> None:
+def test_joints_move_a_skin_independently_of_its_node(tmp_path: Path, joints: str, weights: str) -> None:
     contents = read(skinned(joints, weights), tmp_path)
     assert posed(contents, "Bend", 0) == pytest.approx(TETRAHEDRON)
-    # About (1, 0): the second vertex stays, the third turns from (0, 1) to (0, -1), the fourth half of the way.
+    # A rotation about (1, 0) keeps the second vertex, moves the third from (0, 1) to (0, -1), the fourth half as far.
     turned = [(0, 0, 0), (1, 0, 0), (0, -1, 0), (0.5, -0.5, 1)]
     assert posed(contents, "Bend", 1) == pytest.approx(np.array(turned), abs=1e-6 if weights == "f4" else 5e-3)
-    assert contents.parts[0].matrix.tolist() == np.eye(4).tolist(), "so that nothing mirrors it"
+    assert contents.parts[0].matrix.tolist() == np.eye(4).tolist(), "the skin is not mirrored"
     assert contents.rig is not None and contents.rig.movers() == {1, 2}
 
 
@@ -89,7 +89,7 @@ def test_joints_without_inverse_matrices_start_from_the_mesh_itself(tmp_path: Pa
     assert posed(read(file, tmp_path), "Bend", 0)[1].tolist() == [2, 0, 0]
 
 
-def test_vertices_without_weights_go_with_the_first_joint_and_are_counted(tmp_path: Path) -> None:
+def test_vertices_without_weights_follow_the_first_joint_and_are_counted(tmp_path: Path) -> None:
     file = skinned()
     attributes = file.tree["meshes"][0]["primitives"][0]["attributes"]
     attributes["WEIGHTS_0"] = file.rows([(0, 3, 0, 0)] + [(0, 0, 0, 0)] * 3, "VEC4")
@@ -104,10 +104,10 @@ def test_a_second_set_of_joints(tmp_path: Path) -> None:
     file = skinned()
     attributes = file.tree["meshes"][0]["primitives"][0]["attributes"]
     attributes |= {"JOINTS_1": attributes["JOINTS_0"], "WEIGHTS_1": attributes["WEIGHTS_0"]}
-    assert posed(read(file, tmp_path), "Bend", 0) == pytest.approx(TETRAHEDRON), "weights count by their share"
+    assert posed(read(file, tmp_path), "Bend", 0) == pytest.approx(TETRAHEDRON), "weights are normalised"
 
 
-def test_a_primitive_that_keeps_few_of_its_vertices_keeps_their_joints_and_targets(tmp_path: Path) -> None:
+def test_selected_vertices_keep_their_joints_and_targets(tmp_path: Path) -> None:
     file = File()
     joints = np.zeros((12, 4), int)
     joints[8:, 0] = 1
@@ -130,7 +130,7 @@ def test_a_primitive_that_keeps_few_of_its_vertices_keeps_their_joints_and_targe
 # --- morph targets, nodes and instances ------------------------------------------------------------------------------
 
 
-def test_morph_targets_add_up_also_sparse_and_quantised_ones(tmp_path: Path) -> None:
+def test_morph_targets_add_up_dense_sparse_and_quantised(tmp_path: Path) -> None:
     file = File()
     sparse = {
         "count": 1,
@@ -152,7 +152,7 @@ def test_morph_targets_add_up_also_sparse_and_quantised_ones(tmp_path: Path) -> 
     raised[2, 2] = 5
     assert first == pytest.approx(2 * TETRAHEDRON) and second == pytest.approx(TETRAHEDRON + raised + (9, 0, 0))
     assert posed(contents, "0", 1)[:4] == pytest.approx(1.5 * TETRAHEDRON + raised)
-    assert [part.positions.tolist() for part in contents.parts] == [TETRAHEDRON.tolist()] * 2, "as they were modelled"
+    assert [part.positions.tolist() for part in contents.parts] == [TETRAHEDRON.tolist()] * 2, "in the modelled shape"
 
 
 def test_parts_and_their_instances_move_with_their_nodes(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_parts_and_their_instances_move_with_their_nodes(tmp_path: Path) -> None
     assert np.concatenate(at_rest) == pytest.approx(posed(contents, "0", 0))
 
 
-def test_a_sparse_mesh_plays(tmp_path: Path) -> None:
+def test_a_mesh_with_sparse_positions_is_animated(tmp_path: Path) -> None:
     file = File()
     primitive = file.primitive()
     file.tree["accessors"][0]["sparse"] = {
@@ -183,7 +183,7 @@ def test_a_sparse_mesh_plays(tmp_path: Path) -> None:
     assert posed(read(file, tmp_path), "0", 1)[1] == pytest.approx((0, 4, 0), abs=1e-6)
 
 
-def test_a_file_in_which_nothing_moves_has_no_rig(tmp_path: Path) -> None:
+def test_a_file_without_motion_has_no_rig(tmp_path: Path) -> None:
     contents = read(File().shown(), tmp_path)
     assert contents.rig is None and contents.animations == {}
 
@@ -216,20 +216,20 @@ def test_rotations_as_normalised_integers(tmp_path: Path) -> None:
     assert posed(read(file, tmp_path), "0", 1)[1] == pytest.approx((0, 1, 0), abs=1e-4)
 
 
-def test_animations_are_named_or_numbered_and_read_when_asked_for(tmp_path: Path) -> None:
+def test_animations_are_named_or_numbered_and_read_on_demand(tmp_path: Path) -> None:
     file = skinned()
     for name in (None, "Bend", 5, "Worse"):
         animate(file, (2, "translation", (0, 1), ((1, 0, 0), (2, 0, 0))), name=name)
     file.tree["animations"][-1]["samplers"][0]["input"] = 99
     contents = read(file, tmp_path)
     assert list(contents.animations) == ["Bend", "1", "2", "3", "Worse"]
-    assert contents.animations["Bend"]()[0].path == "rotation", "the first of that name"
+    assert contents.animations["Bend"]()[0].path == "rotation", "the first animation with this name"
     with pytest.raises(InputError) as raised:
         contents.animations["Worse"]()
     assert str(raised.value) == f"{tmp_path / 'arm.glb'}: animation Worse, channel 0: times: there is no accessor 99"
 
 
-def test_channels_that_move_nothing_here_are_counted(tmp_path: Path) -> None:
+def test_channels_that_cannot_be_used_are_counted(tmp_path: Path) -> None:
     file = skinned()
     animate(file, (2, "translation", (0, 1), ((1, 0, 0), (2, 0, 0))), name="More")
     pointer = {"pointer": "/materials/0/pbrMetallicRoughness/baseColorFactor"}
@@ -255,7 +255,7 @@ def test_channels_that_move_nothing_here_are_counted(tmp_path: Path) -> None:
 
 
 def put(*path: Any, value: Any) -> Callable[[File], None]:
-    """Sets a value of a file's tree."""
+    """Return a function that sets a value in the tree of a file."""
 
     def change(file: File) -> None:
         at: Any = file.tree
@@ -350,7 +350,7 @@ BAD: dict[str, tuple[Callable[[File], None], str]] = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_files_are_named_with_what_is_wrong(tmp_path: Path, name: str) -> None:
+def test_errors_name_the_file_and_the_location(tmp_path: Path, name: str) -> None:
     change, message = BAD[name]
     file = skinned()
     change(file)

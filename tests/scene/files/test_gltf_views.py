@@ -14,7 +14,7 @@ from wgsss.scene.files.contents import Contents
 from wgsss.scene.files.gltf import read_gltf
 
 HALF = math.sqrt(0.5)
-ABOUT_X = [-HALF, 0, 0, HALF]  # -z turns to -y
+ABOUT_X = [-HALF, 0, 0, HALF]  # rotates -z to -y
 
 
 def lit(*lights: dict[str, Any], **node: Any) -> File:
@@ -46,7 +46,7 @@ def test_lights_are_where_their_nodes_are(tmp_path: Path) -> None:
     assert second.position == (1, 2, 3) and contents.notes == ()
 
 
-def test_what_of_a_light_is_left_out_is_noted(tmp_path: Path) -> None:
+def test_cones_ranges_and_lost_directions_of_lights_are_noted(tmp_path: Path) -> None:
     spot = {"type": "spot", "intensity": 5, "spot": {"outerConeAngle": 0.3}, "range": 10}
     contents = read(lit(spot), tmp_path)
     assert contents.lights[0].kind == "point" and contents.lights[0].power == (5, 5, 5)
@@ -78,7 +78,7 @@ def test_a_bad_light_is_named(tmp_path: Path, light: dict[str, Any], message: st
     assert refused(lit(light), tmp_path) == message.removeprefix("KHR_lights_punctual, ")
 
 
-def test_a_light_that_is_not_there(tmp_path: Path) -> None:
+def test_a_missing_light_is_an_error(tmp_path: Path) -> None:
     file = lit({"type": "point"})
     file.tree["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 3
     assert refused(file, tmp_path) == "node 1: KHR_lights_punctual: there is no light 3"

@@ -1,4 +1,4 @@
-"""Materials of OBJ files: textures with their options, and a note on all that is left out."""
+"""Materials of OBJ files: textures with options, and notes on statements that are left out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wgsss.scene.files.obj.mtl import read_materials
 
 
 def read(folder: Path, text: str, *images: str) -> tuple[Look, list[str]]:
-    """The one material that is described here, and notes, with empty files in place of the images."""
+    """Read a material file with one material, and return its look and the notes. Images are empty files."""
     for image in images:
         (folder / image).parent.mkdir(parents=True, exist_ok=True)
         (folder / image).write_bytes(b"x")
@@ -29,15 +29,15 @@ def test_colour_roughness_and_index_of_refraction(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("eta", ["1", "1.0", "0", "3.5", "nan"])
-def test_an_index_of_refraction_that_says_nothing(tmp_path: Path, eta: str) -> None:
+def test_invalid_indices_of_refraction_are_ignored(tmp_path: Path, eta: str) -> None:
     assert read(tmp_path, f"Ni {eta}")[0].eta is None
 
 
-def test_one_number_stands_for_three(tmp_path: Path) -> None:
+def test_a_single_number_is_repeated(tmp_path: Path) -> None:
     assert read(tmp_path, "Kd 0.5")[0].base_color == (0.5, 0.5, 0.5)
 
 
-def test_a_black_colour_beside_a_texture_is_white(tmp_path: Path) -> None:
+def test_a_black_colour_with_a_texture_becomes_white(tmp_path: Path) -> None:
     look, notes = read(tmp_path, "Kd 0 0 0\nmap_Kd t.png", "t.png")
     assert look.base_color == (1, 1, 1) and notes == [
         "material m: Kd 0 0 0 would make its texture black and is replaced by 1 1 1"
@@ -73,12 +73,12 @@ def test_names_of_textures(tmp_path: Path, line: str, name: str) -> None:
     assert look.base_color_map.source == tmp_path / name and look.base_color_map.name == Path(name).name
 
 
-def test_the_name_as_written_comes_before_other_spellings(tmp_path: Path) -> None:
+def test_the_written_name_is_tried_before_other_spellings(tmp_path: Path) -> None:
     look, _ = read(tmp_path, "map_Kd T%20.png", "T%20.png", "T .png", "t%20.png")
     assert look.base_color_map and look.base_color_map.source == tmp_path / "T%20.png"
 
 
-def test_textures_that_are_not_files(tmp_path: Path) -> None:
+def test_missing_textures_are_noted(tmp_path: Path) -> None:
     (tmp_path / "folder.png").mkdir()
     for name in ("gone.png", "folder.png", "/dev/zero", "x" * 300, "a\0b"[:1] + ".png", "."):
         look, (note,) = read(tmp_path, f"map_Kd {name}")
@@ -91,13 +91,13 @@ OPTIONS = (
 
 
 @pytest.mark.parametrize("line", [f"{OPTIONS} 1 t.png", f"1 t.png {OPTIONS}"])
-def test_options_have_their_own_numbers_of_words(tmp_path: Path, line: str) -> None:
+def test_options_take_different_numbers_of_words(tmp_path: Path, line: str) -> None:
     look, notes = read(tmp_path, f"map_Kd {line}", "1 t.png")
     assert notes == []
     assert look.base_color_map is not None and look.base_color_map.source == tmp_path / "1 t.png"
     rows = look.base_color_map.transform
     assert rows is not None
-    # At the file's (u, v) = (0.25, 0.5), v up, the texture is looked up at (2 * 0.25 + 0.1, 3 * 0.5 + 0.2).
+    # At (u, v) = (0.25, 0.5), v up, the lookup is at (2 * 0.25 + 0.1, 3 * 0.5 + 0.2).
     u, v = (a * 0.25 + b * (1 - 0.5) + c for a, b, c in rows)
     assert (u, 1 - v) == pytest.approx((0.6, 1.7))
 
@@ -130,7 +130,7 @@ def test_specular_map(tmp_path: Path) -> None:
     assert look.specular_map is not None and look.specular_map.channels == "L" and notes == []
 
 
-def test_opacity_in_the_alpha_of_the_colours_cuts_out(tmp_path: Path) -> None:
+def test_opacity_in_the_alpha_of_the_colour_map_is_a_mask(tmp_path: Path) -> None:
     look, notes = read(tmp_path, "map_Kd leaf.png\nmap_d Leaf.png\nd 0.0", "leaf.png")
     assert look.cutoff == 0.5 and notes == []
     look, notes = read(tmp_path, "map_Kd leaf.png\nmap_d mask.png", "leaf.png", "mask.png")
@@ -156,7 +156,7 @@ def test_opacity_in_the_alpha_of_the_colours_cuts_out(tmp_path: Path) -> None:
         ("refl -type sphere sky.png", "the texture 'sky.png' (refl) is left out"),
     ],
 )
-def test_what_is_left_out_is_noted(tmp_path: Path, line: str, note: str) -> None:
+def test_unused_statements_are_noted(tmp_path: Path, line: str, note: str) -> None:
     assert f"material m: {note}" in read(tmp_path, line)[1]
 
 
@@ -165,21 +165,21 @@ def test_the_ambient_texture_that_repeats_the_diffuse_one_is_not_noted(tmp_path:
     assert len(read(tmp_path, "map_Ka u.png\nmap_Kd t.png", "u.png")[1]) == 1
 
 
-def test_one_note_tells_of_many_materials(tmp_path: Path) -> None:
+def test_one_note_names_many_materials(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("".join(f"newmtl m{i}\nd 0.5\n" for i in range(5)))
     looks, notes = read_materials(tmp_path / "a.mtl")
     assert len(looks) == 5
     assert notes == ["materials m0, m1, m2 and 2 more: transparency (d, Tr) is left out: the material is drawn opaque"]
 
 
-def test_of_two_materials_with_one_name_the_first_counts(tmp_path: Path) -> None:
+def test_the_first_of_two_materials_with_one_name_is_used(tmp_path: Path) -> None:
     look, notes = read(tmp_path, "Kd 1 0 0\nnewmtl m\nKd 0 1 0")
     assert look.base_color == (1, 0, 0)
     assert notes == ["material m: it is defined more than once, and the first definition is used"]
 
 
 @pytest.mark.parametrize("data", [b"", b"newmtl a\0"])
-def test_no_material_file(tmp_path: Path, data: bytes) -> None:
+def test_a_missing_material_file_is_an_error(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "a.mtl").write_bytes(data)
     with pytest.raises(InputError, match=r"a\.mtl"):
         read_materials(tmp_path / "a.mtl")

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: every way to write a face, what is left out is told, and damage names its line."""
+"""Wavefront OBJ: every notation of faces, notes on statements that are left out, and errors that name the line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CUBE_FACES = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 
 
 
 def read(folder: Path, text: str | bytes, name: str = "mesh.obj") -> Contents:
-    """Read what is written here, with any warning an error."""
+    """Write text to a file and read it. Any warning is an error."""
     path = folder / name
     path.write_bytes(text.encode() if isinstance(text, str) else text)
     with warnings.catch_warnings():
@@ -49,13 +49,13 @@ def normals(part) -> np.ndarray:
 
 
 def cube(at: float = 0.0, relative: bool = False, blank: str = " ") -> str:
-    """A closed cube of edge 1, its corners counted from the end of the file so far, or from the start of the file."""
+    """Return the text of a closed cube of edge 1, with negative (`relative`) or positive indices."""
     lines = [blank.join(["v", *(f"{x}" for x in (p[0] + at, p[1], p[2]))]) for p in CUBE_CORNERS]
     lines += [blank.join(["f", *(str(i - 9 if relative else i) for i in face)]) for face in CUBE_FACES]
     return "\n".join(lines) + "\n"
 
 
-def test_negative_numbers_count_from_the_end_of_what_was_read_so_far(tmp_path: Path) -> None:
+def test_negative_numbers_count_back_from_the_face(tmp_path: Path) -> None:
     three = read(tmp_path, "".join(cube(at, relative=True) for at in (0, 5, 10)))
     assert volume(three) == pytest.approx(3.0) and area(three) == pytest.approx(18.0)
     assert np.ptp(three.parts[0].positions[:, 0]) == 11.0
@@ -68,7 +68,7 @@ def test_negative_numbers_of_texture_coordinates_and_normals(tmp_path: Path) -> 
     assert (part.normals == (0, 0, 1)).all()
 
 
-def test_a_face_may_name_vertices_that_come_after_it(tmp_path: Path) -> None:
+def test_a_face_may_refer_to_later_vertices(tmp_path: Path) -> None:
     assert area(read(tmp_path, "f 1 2 3 4\n" + SQUARE)) == 1.0
 
 
@@ -94,7 +94,7 @@ def test_a_face_may_name_vertices_that_come_after_it(tmp_path: Path) -> None:
         lambda text: "# caf\udce9\n" + "o na\udcefve\n" + text,
     ],
 )
-def test_one_cube_however_it_is_written(tmp_path: Path, change) -> None:
+def test_every_notation_gives_the_same_cube(tmp_path: Path, change) -> None:
     contents = read(tmp_path, change(cube()).encode("utf-8", "surrogateescape"))
     assert volume(contents) == pytest.approx(1.0) and area(contents) == pytest.approx(6.0)
     assert contents.notes == () and not contents.splits
@@ -105,10 +105,10 @@ def test_concave_polygons_keep_their_area(tmp_path: Path) -> None:
     for corners in ("1 2 3 4 5 6", "3 4 5 6 1 2", "6 5 4 3 2 1"):
         contents = read(tmp_path, f"{outline}f {corners}\n")
         assert area(contents) == pytest.approx(975.0)
-        assert abs(normals(contents.parts[0]).sum(axis=0)[2]) == pytest.approx(2 * 975.0), "no triangle is turned over"
+        assert abs(normals(contents.parts[0]).sum(axis=0)[2]) == pytest.approx(2 * 975.0), "no triangle is flipped"
 
 
-def test_corners_may_leave_fields_out_each_face_in_its_own_way(tmp_path: Path) -> None:
+def test_each_face_may_leave_out_fields_of_its_corners(tmp_path: Path) -> None:
     text = (
         SQUARE
         + "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nf 1/1 2/2 3/3\nf 1//1 3//1 4//1\nf 1/1/1 2/2/1 3/3/1\nf 1/ 2// 3/3/\n"
@@ -117,8 +117,8 @@ def test_corners_may_leave_fields_out_each_face_in_its_own_way(tmp_path: Path) -
     part = contents.parts[0]
     assert len(part.faces) == 4 and contents.splits
     assert contents.notes == ("2 of 4 faces have no texture coordinates and get 0 0",)
-    given = np.linalg.norm(part.normals[part.faces], axis=2)
-    np.testing.assert_array_equal(given, [[0, 0, 0], [1, 1, 1], [1, 1, 1], [0, 0, 0]])
+    lengths = np.linalg.norm(part.normals[part.faces], axis=2)
+    np.testing.assert_array_equal(lengths, [[0, 0, 0], [1, 1, 1], [1, 1, 1], [0, 0, 0]])
     np.testing.assert_array_equal(part.uvs[0][part.faces[1]], [[0, 0]] * 3)
     np.testing.assert_array_equal(part.uvs[0][part.faces[0]], [[0, 1], [1, 1], [1, 0]])
 
@@ -128,13 +128,13 @@ def test_vertices_are_split_only_where_corners_differ(tmp_path: Path) -> None:
     assert len(read(tmp_path, text).parts[0].positions) == 5
 
 
-def test_texture_coordinates_of_one_and_three_numbers_and_those_that_are_not_finite(tmp_path: Path) -> None:
+def test_texture_coordinates_of_one_and_three_numbers_or_not_finite(tmp_path: Path) -> None:
     contents = read(tmp_path, SQUARE + "vt .25\nvt 1 .5 7\nvt nan 0\nvt 1.#INF 0\nf 1/1 2/2 3/3 4/4\n")
     np.testing.assert_array_equal(contents.parts[0].uvs[0], [[0.25, 1], [1, 0.5], [0, 1], [0, 1]])
     assert contents.notes == ("2 texture coordinates are not finite numbers and become 0",)
 
 
-def test_positions_that_are_not_finite_are_kept_for_the_check_of_the_mesh(tmp_path: Path) -> None:
+def test_positions_that_are_not_finite_are_left_to_the_mesh_checks(tmp_path: Path) -> None:
     positions = read(tmp_path, "v 0 0 0\nv 1 0 nan\nv -1.#IND 1e400 0\nv 1 -nan(ind) 0\nf 1 2 3 4\n").parts[0].positions
     assert (~np.isfinite(positions)).sum() == 4
 
@@ -151,7 +151,7 @@ def test_vertex_colours_from_0_to_255(tmp_path: Path) -> None:
     assert len(contents.notes) == 2
 
 
-def test_colours_that_zbrush_writes_in_comments(tmp_path: Path) -> None:
+def test_vertex_colours_in_comments_of_zbrush(tmp_path: Path) -> None:
     painted = "#MRGB ffff0000ff00ff00\n#MRGB ff000000ffffffff\n"
     np.testing.assert_allclose(
         read(tmp_path, SQUARE + painted + "f 1 2 3 4\n").parts[0].colors, [[1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 1, 1]]
@@ -161,7 +161,7 @@ def test_colours_that_zbrush_writes_in_comments(tmp_path: Path) -> None:
     assert contents.notes == ("vertex colours (#MRGB) are left out: there are 1 for 4 vertices",)
 
 
-def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
+def test_statements_that_are_left_out_are_counted(tmp_path: Path) -> None:
     text = (
         SQUARE
         + "v 9 9 9\nv 8 8 8 2\nl 1 2 3\np 1\np 2\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2 3\nend\n"
@@ -183,11 +183,11 @@ def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
     ("statements", "noted"),
     [("s 1\nf 1 2 3\nf 1 3 4\n", False), ("s off\nf 1 2 3 4\n", True), ("s 1\nf 1 2 3\ns 2\nf 1 3 4\n", True)],
 )
-def test_smoothing_groups_are_noted_where_they_ask_for_hard_edges(tmp_path: Path, statements: str, noted: bool) -> None:
+def test_smoothing_groups_with_hard_edges_are_noted(tmp_path: Path, statements: str, noted: bool) -> None:
     assert bool(read(tmp_path, SQUARE + statements).notes) == noted
 
 
-def test_smoothing_groups_do_not_matter_beside_normals(tmp_path: Path) -> None:
+def test_smoothing_groups_are_not_noted_if_faces_have_normals(tmp_path: Path) -> None:
     assert read(tmp_path, SQUARE + "vn 0 0 1\ns off\nf 1//1 2//1 3//1\ns 3\nf 1//1 3//1 4//1\n").notes == ()
 
 
@@ -207,7 +207,7 @@ def test_materials_become_parts(tmp_path: Path) -> None:
     assert contents.splits and contents.notes == ()
 
 
-def test_materials_that_are_not_there(tmp_path: Path) -> None:
+def test_missing_materials_are_noted(tmp_path: Path) -> None:
     contents = read(tmp_path, "mtllib gone.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
     assert contents.notes == ("the material file 'gone.mtl' does not exist",)
     contents = read(tmp_path, SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
@@ -218,7 +218,7 @@ def test_materials_that_are_not_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "statement", ["b.mtl a.mtl", "my file.mtl", "b.mtl my file.mtl", "C:\\x\\A.MTL", "sub/a.mtl # c"]
 )
-def test_material_files_by_other_names(tmp_path: Path, statement: str) -> None:
+def test_material_files_in_other_spellings(tmp_path: Path, statement: str) -> None:
     for name in ("a.mtl", "my file.mtl"):
         (tmp_path / name).write_text("newmtl m\nKd 0.5 0.5 0.5\n")
     (tmp_path / "b.mtl").write_text("newmtl other\n")
@@ -259,11 +259,11 @@ def test_a_damaged_material_file_does_not_hide_the_mesh(tmp_path: Path) -> None:
         (b"\x89PNG\r\n\x1a\n\0\0\0\r", "damaged: it is not a text file"),
     ],
 )
-def test_damage_is_one_line_that_says_where(tmp_path: Path, text: str | bytes, message: str) -> None:
+def test_damage_is_one_line_with_the_location(tmp_path: Path, text: str | bytes, message: str) -> None:
     assert refuse(tmp_path, text) == message
 
 
-def test_separators_of_unicode_do_not_break_the_line_of_a_message(tmp_path: Path) -> None:
+def test_unicode_line_separators_do_not_break_a_message(tmp_path: Path) -> None:
     assert refuse(tmp_path, SQUARE + "f 1 2 \u2028\x85\n").endswith("is not a whole number")
 
 

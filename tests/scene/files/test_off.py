@@ -1,4 +1,4 @@
-"""OFF: every header, faces of mixed sizes, colours, and damage that names its line."""
+"""OFF: every header, faces of mixed sizes, colours, and errors that name the line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def off(head: str = "OFF\n4 1 0", vertices: list[str] = VERTICES, faces: list[st
 
 
 def read(folder: Path, text: str | bytes) -> Contents:
-    """Read what is written here, with any warning an error."""
+    """Write text to a file and read it. Any warning is an error."""
     path = folder / "mesh.off"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
     with warnings.catch_warnings():
@@ -89,7 +89,7 @@ def test_normals_colours_and_texture_coordinates(tmp_path: Path) -> None:
     assert contents.splits
 
 
-def test_what_is_left_out_is_noted(tmp_path: Path) -> None:
+def test_data_that_are_left_out_are_noted(tmp_path: Path) -> None:
     assert read(tmp_path, off(vertices=[f"{v} 9" for v in VERTICES])).notes == (
         "4 vertices have more than 3 numbers: the rest is left out",
     )
@@ -122,5 +122,5 @@ def test_what_is_left_out_is_noted(tmp_path: Path) -> None:
         (off("OFF\n4 0 0", faces=[]), "the mesh is empty: it has no faces"),
     ],
 )
-def test_damage_is_one_line_that_says_where(tmp_path: Path, text: str | bytes, message: str) -> None:
+def test_damage_is_one_line_with_the_location(tmp_path: Path, text: str | bytes, message: str) -> None:
     assert refuse(tmp_path, text) == message

@@ -1,4 +1,4 @@
-"""PLY: ASCII and both byte orders read alike, whatever the names; what is left out is told; damage is located."""
+"""PLY: ASCII and both byte orders, all known names, notes on data that are left out, and errors with a location."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FACES = ("face", [INDICES], [([0, 1, 2, 3],)])
 
 
 def ply(form: str, *elements, comments: tuple[str, ...] = (), end: str = "\n") -> bytes:
-    """A file of elements (name, properties, rows); a row holds a number, or a list, for each property."""
+    """Make a file of elements (name, properties, rows). A row has a number or a list for each property."""
     lines = ["ply", f"format {form} 1.0", *comments]
     body = b""
     for name, properties, rows in elements:
@@ -51,7 +51,7 @@ def ply(form: str, *elements, comments: tuple[str, ...] = (), end: str = "\n") -
 
 
 def read(folder: Path, data: bytes) -> Contents:
-    """Read a file, with any warning an error."""
+    """Read a file. Any warning is an error."""
     path = folder / "mesh.ply"
     path.write_bytes(data)
     with warnings.catch_warnings():
@@ -87,7 +87,7 @@ def test_forms_and_line_ends(tmp_path: Path, form: str, end: str) -> None:
 
 
 @every_form
-def test_a_body_that_starts_like_the_end_of_a_line(tmp_path: Path, form: str) -> None:
+def test_a_binary_body_may_start_like_a_line_end(tmp_path: Path, form: str) -> None:
     lead = ("lead", ["uchar a"], [(10,)])
     for end in ("\n", "\r"):
         assert area(read(tmp_path, ply(form, lead, VERTICES, FACES, end=end))) == 1.0
@@ -116,7 +116,7 @@ def test_faces_of_mixed_sizes_between_other_properties(tmp_path: Path, form: str
 
 
 @every_form
-def test_other_elements_before_between_and_after(tmp_path: Path, form: str) -> None:
+def test_unknown_elements_before_between_and_after(tmp_path: Path, form: str) -> None:
     data = ply(
         form,
         ("camera", ["float view_px", "list uchar short frames"], [(1.5, [1, 2]), (2.5, [])]),
@@ -184,7 +184,7 @@ def test_texture_coordinates_of_corners_split_vertices(tmp_path: Path, form: str
 
 
 @every_form
-def test_a_part_for_each_texture(tmp_path: Path, form: str) -> None:
+def test_each_texture_gives_a_part(tmp_path: Path, form: str) -> None:
     for name in ("skin.png", "my eye.png"):
         (tmp_path / name).write_bytes(b"x")
     rows = [([0, 1, 2], [0] * 6, 1), ([0, 2, 3], [1] * 6, 0), ([0, 1, 3], [0] * 6, -1), ([1, 2, 3], [0] * 6, 2)]
@@ -197,7 +197,7 @@ def test_a_part_for_each_texture(tmp_path: Path, form: str) -> None:
     assert contents.notes == ("the texture 'gone.png' does not exist and is left out",)
 
 
-def test_one_texture_for_all(tmp_path: Path) -> None:
+def test_one_texture_gives_one_part(tmp_path: Path) -> None:
     (tmp_path / "t.png").write_bytes(b"x")
     vertices = ("vertex", [*XYZ, "float s", "float t"], [(*p, 0, 0) for p in SQUARE])
     contents = read(tmp_path, ply("ascii", vertices, FACES, comments=("comment TextureFile t.png",)))
@@ -219,14 +219,14 @@ def test_colours_of_vertices(tmp_path: Path, form: str, names: str, kind: str, f
     assert contents.notes == ()
 
 
-def test_colours_that_are_not_colours(tmp_path: Path) -> None:
+def test_colours_out_of_range_are_clipped(tmp_path: Path) -> None:
     rows = [(0, 0, 0, 255, 0, 0), (1, 0, 0, 0, 0, 0), (1, 1, 0, 127.5, 0, 0), (0, 1, 0, float("nan"), 0, 0)]
     contents = read(tmp_path, ply("ascii", ("vertex", [*XYZ, "float red", "float green", "float blue"], rows), FACES))
     np.testing.assert_allclose(contents.parts[0].colors[:, 0], [1, 0, 0.214041, 1], atol=1e-6)
     assert len(contents.notes) == 2
 
 
-def test_what_is_left_out_is_named(tmp_path: Path) -> None:
+def test_elements_and_properties_that_are_left_out_are_named(tmp_path: Path) -> None:
     vertices = (
         "vertex",
         [*XYZ, "uchar red", "uchar green", "uchar blue", "uchar alpha", "float quality"],
@@ -248,7 +248,7 @@ def test_odd_names(tmp_path: Path, names: tuple[str, str, str]) -> None:
 
 
 @every_form
-def test_positions_that_are_not_finite_are_kept_for_the_check_of_the_mesh(tmp_path: Path, form: str) -> None:
+def test_positions_that_are_not_finite_are_left_to_the_mesh_checks(tmp_path: Path, form: str) -> None:
     vertices = ("vertex", XYZ, [*SQUARE[:3], (float("nan"), float("inf"), 0)])
     assert (~np.isfinite(read(tmp_path, ply(form, vertices, FACES)).parts[0].positions)).sum() == 2
 
@@ -325,14 +325,14 @@ def test_truncation_anywhere(tmp_path: Path, form: str) -> None:
         (b"ply\n", b"plx\n", "damaged, or not a .ply file: its first line is not 'ply'"),
     ],
 )
-def test_damage_is_one_line_that_says_where(tmp_path: Path, old: bytes, new: bytes, message: str) -> None:
+def test_damage_is_one_line_with_the_location(tmp_path: Path, old: bytes, new: bytes, message: str) -> None:
     data = ply("ascii", ("vertex", XYZ, SQUARE), ("face", [INDICES], [([0, 1, 2],)]))
     assert old in data
     assert refuse(tmp_path, data.replace(old, new, 1)) == message
 
 
 @every_form
-def test_texture_coordinates_that_do_not_fit_their_face(tmp_path: Path, form: str) -> None:
+def test_wrong_numbers_of_texture_coordinates_are_errors(tmp_path: Path, form: str) -> None:
     faces = ("face", [INDICES, "list uchar float texcoord"], [([0, 1, 2], [0] * 6), ([0, 1, 2], [0] * 5)])
     assert refuse(tmp_path, ply(form, VERTICES, faces)) == "row 2 of element face: 5 texture coordinates for 3 corners"
 

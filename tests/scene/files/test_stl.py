@@ -1,4 +1,4 @@
-"""STL: binary files that start like ASCII ones and the other way round, and what is damaged or left out."""
+"""STL: binary files that start like ASCII files and vice versa, damaged files, and notes on data that are left out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def ascii_solid(name: str = "", facets=FACETS, end: str = "\n") -> bytes:
 
 
 def read(folder: Path, data: bytes) -> Contents:
-    """Read a file, with any warning an error."""
+    """Read a file. Any warning is an error."""
     path = folder / "mesh.stl"
     path.write_bytes(data)
     with warnings.catch_warnings():
@@ -79,7 +79,7 @@ def test_colours_of_facets_are_noted(tmp_path: Path) -> None:
     assert read(tmp_path, binary(b"COLOR=\xff\0\0\xff")).notes == ("the colour is left out",)
 
 
-def test_what_follows_the_last_facet_is_noted(tmp_path: Path) -> None:
+def test_bytes_after_the_last_facet_are_noted(tmp_path: Path) -> None:
     contents = read(tmp_path, binary() + b"more")
     assert len(corners(contents)) == 2 and contents.notes == ("4 bytes after the last facet are left out",)
     cut = ascii_solid().removesuffix(b"endsolid \n")
@@ -92,7 +92,7 @@ def test_loops_of_more_than_three_vertices_are_split(tmp_path: Path) -> None:
     assert np.cross(b - a, c - a)[:, 2].tolist() == [4, 4, 1, 1]
 
 
-def test_positions_that_are_not_finite_are_kept_for_the_check_of_the_mesh(tmp_path: Path) -> None:
+def test_positions_that_are_not_finite_are_left_to_the_mesh_checks(tmp_path: Path) -> None:
     data = bytearray(binary())
     data[96:108] = struct.pack("<2f", float("nan"), float("inf")) + b"\1\0\x80\x7f"  # the last is a signalling NaN
     assert (~np.isfinite(corners(read(tmp_path, bytes(data))))).sum() == 3

@@ -1,4 +1,4 @@
-"""Polygons in triangles: the same area and winding, nothing without an area, and an end to it."""
+"""Triangulation of polygons keeps area and winding, makes no triangles without area, and terminates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FILE = Path("mesh.obj")
 
 
 def split(*polygons, notes: list[str] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Area vectors (T, 3) of the triangles of polygons of points, and the polygon of each."""
+    """Triangulate polygons. Return the area vectors (T, 3) of the triangles, and the polygon of each (T,)."""
     positions = np.array([point for polygon in polygons for point in polygon], np.float64)
     counts = np.array([len(polygon) for polygon in polygons])
     with warnings.catch_warnings():
@@ -63,11 +63,11 @@ def test_concave_polygons(name: str, seed: int | None, start: int) -> None:
         areas, faces = split(polygon[::order] @ turn.T * 1e-3 + 0.5)
         up = areas @ turn[:, 2] * order
         assert len(faces) == len(polygon) - 2
-        assert (up > 0).all(), "a triangle is turned over, or has no area"
+        assert (up > 0).all(), "a triangle is flipped, or has no area"
         assert up.sum() == pytest.approx(expected * 1e-6)
 
 
-def test_corners_that_are_straight_but_for_rounding_give_no_slivers() -> None:
+def test_nearly_straight_corners_give_no_slivers() -> None:
     rng = np.random.default_rng(0)
     ends = flat((0, 0), (9, 0), (9, 3), (4, 3), (4, 9), (0, 9), turn=rotation(4))
     shares = np.linspace(0, 1, 7)[:-1, None, None]
@@ -93,7 +93,7 @@ def test_the_corners_of_many_faces_keep_their_order() -> None:
     assert notes == ["1 faces of fewer than three corners are left out"]
 
 
-def test_polygons_that_cross_themselves_keep_all_their_edges() -> None:
+def test_polygons_that_cross_themselves_keep_all_edges() -> None:
     angles = np.arange(5) * 4 * np.pi / 5
     star = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
     folded = np.array([(0, 0, 0), (0.49, 0.25, 0), (0.5, 0.246, 0), (0.02, 0.12, 0.05)])
@@ -104,7 +104,7 @@ def test_polygons_that_cross_themselves_keep_all_their_edges() -> None:
         assert len(triangles) == count - 2 and {(i, (i + 1) % count) for i in range(count)} <= edges
 
 
-def test_a_folded_quad_is_split_where_its_triangles_are_smaller() -> None:
+def test_a_folded_quad_is_split_along_the_diagonal_with_less_area() -> None:
     areas, _ = split([(0, 0, 0), (1, 1, 0), (1, 0, 0.1), (0, 1, 0.1)])
     other, _ = split([(1, 1, 0), (1, 0, 0.1), (0, 1, 0.1), (0, 0, 0)])
     np.testing.assert_allclose(*(np.linalg.norm(a, axis=1).sum() for a in (areas, other)))
@@ -123,8 +123,8 @@ def test_a_folded_quad_is_split_where_its_triangles_are_smaller() -> None:
         np.array([(0, 0, 0), (5e-324, 0, 0), (5e-324, 5e-324, 0), (0, 5e-324, 0)]),
     ],
 )
-def test_polygons_beyond_help_come_to_an_end(polygon: np.ndarray) -> None:
-    assert len(split(polygon)[1]) >= 1, "the caller can count what has no area"
+def test_degenerate_polygons_terminate(polygon: np.ndarray) -> None:
+    assert len(split(polygon)[1]) >= 1, "degenerate triangles are returned for the caller to count"
 
 
 def test_repeated_corners_are_left_out() -> None:
@@ -143,13 +143,13 @@ def test_large_polygons_take_little_time() -> None:
     assert time.perf_counter() - start < 10.0
 
 
-def test_a_face_that_would_take_too_long_is_refused() -> None:
+def test_a_concave_face_with_too_many_corners_is_refused() -> None:
     wild = np.random.default_rng(0).uniform(size=(MAX_CORNERS + 1, 3))
     with pytest.raises(InputError, match=r"mesh.obj: a face of 100001 corners is too large"):
         split(wild)
 
 
-def test_no_face_of_three_corners() -> None:
+def test_a_mesh_without_a_face_of_three_corners_is_empty() -> None:
     with pytest.raises(InputError, match="no face has three corners"):
         split(flat((0, 0), (1, 0)))
     with pytest.raises(InputError, match="it has no faces"):
