@@ -1,4 +1,4 @@
-"""Meshes with texture coordinates of their own whose stretch and seams are known in closed form."""
+"""Meshes with texture coordinates whose stretch and seams are known in closed form."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from wgsss.bake.unwrap import RenderMesh
 from wgsss.scene import Mesh
 
 TILTED = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
-"""An orthonormal frame along no axis."""
+"""an orthonormal frame that is not aligned with the axes"""
 
 
 def sheet(
     uv_per_mm: np.ndarray, *, side: float = 20.0, cells: int = 4, center: tuple[float, float] = (0.5, 0.5)
 ) -> Mesh:
-    """A tilted square of `side` mm; uv = center + uv_per_mm (2, 2) @ (x, y) with x, y in mm from its middle."""
+    """Make a tilted square of `side` mm with uv = center + uv_per_mm (2, 2) @ (x, y), x and y in mm from the centre."""
     t = np.linspace(-side / 2, side / 2, cells + 1)
     x, y = np.meshgrid(t, t)
     plane = np.stack([x, y], axis=-1).reshape(-1, 2)
@@ -25,7 +25,7 @@ def sheet(
 
 
 def box(seed: int = 0, side: float = 10.0, cells: int = 1) -> Mesh:
-    """A cube; each side is a chart of its own size, turned anyhow and every other one mirrored."""
+    """Make a cube. Each side is a chart with random size and rotation; every second one is mirrored."""
     rng = np.random.default_rng(seed)
     t = np.linspace(-0.5, 0.5, cells + 1)
     a, b = np.meshgrid(t, t)
@@ -53,7 +53,7 @@ def box(seed: int = 0, side: float = 10.0, cells: int = 1) -> Mesh:
 
 
 def cylinder(radius: float = 5.0, height: float = 20.0, sides: int = 48, rows: int = 12) -> Mesh:
-    """An open cylinder about z; u goes once around from 0.1 to 0.9, v from 0.2 at the top to 0.8 at the bottom."""
+    """Make an open cylinder about z: u is 0.1 to 0.9 around it, v is 0.2 at the top and 0.8 at the bottom."""
     around, along = np.meshgrid(np.arange(sides + 1), np.arange(rows + 1))
     angle = 2 * np.pi * (around % sides) / sides
     grid = np.stack([radius * np.cos(angle), radius * np.sin(angle), height * (0.5 - along / rows)], axis=-1).reshape(
@@ -65,20 +65,20 @@ def cylinder(radius: float = 5.0, height: float = 20.0, sides: int = 48, rows: i
     faces = np.concatenate([np.stack([a, a + n, a + n + 1], 1), np.stack([a, a + n + 1, a + 1], 1)])
     welded = np.arange(len(grid)).reshape(rows + 1, n)
     welded[:, -1] = welded[:, 0]
-    kept, index = np.unique(welded, return_inverse=True)
-    return Mesh(grid[kept], index.reshape(-1)[faces], corner_uvs=uvs[faces], name="cylinder")
+    distinct, index = np.unique(welded, return_inverse=True)
+    return Mesh(grid[distinct], index.reshape(-1)[faces], corner_uvs=uvs[faces], name="cylinder")
 
 
 def icosphere(radius: float, levels: int) -> Mesh:
-    """A closed sphere without texture coordinates."""
+    """Make a closed sphere without texture coordinates."""
     import trimesh
 
-    made = trimesh.creation.icosphere(levels, radius)
-    return Mesh(made.vertices, made.faces, name="sphere")
+    sphere = trimesh.creation.icosphere(levels, radius)
+    return Mesh(sphere.vertices, sphere.faces, name="sphere")
 
 
 def locate(mesh: Mesh, render_mesh: RenderMesh, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (N, 3), mm, of atlas points (N, 2), and the face (N,) that each lies in or is nearest to."""
+    """Compute positions (N, 3), mm, of atlas points (N, 2), and the face (N,) that contains or is nearest to each."""
     corners = render_mesh.atlas.astype(float)[render_mesh.faces]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
     local = np.einsum("fij,nfj->nfi", np.linalg.inv(edges), uv[:, None] - corners[None, :, 0])

@@ -1,4 +1,4 @@
-"""Balls with a checker on them, as glTF files and as the scene that such a file should become; pictures compared."""
+"""glTF files of a ball with a checker texture, and functions that load scenes and compare their pictures."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ RED, BLUE = (200, 30, 20), (20, 90, 200)
 
 
 def ball(radius: float = RADIUS, columns: int = 17, rows: int = 15) -> tuple[Array, Array, Array]:
-    """Positions (V, 3), texture coordinates (V, 2) and faces (F, 3) of a sphere whose seam and poles are split.
+    """Return positions (V, 3), texture coordinates (V, 2) and faces (F, 3) of a sphere, split at its seam and poles.
 
-    By default, texture coordinates are multiples of 1 / 255: bytes hold them without rounding.
+    By default, texture coordinates are multiples of 1 / 255, so that bytes store them exactly.
     """
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     turn, fall = 2 * np.pi * u, np.pi * v
@@ -38,14 +38,14 @@ def ball(radius: float = RADIUS, columns: int = 17, rows: int = 15) -> tuple[Arr
 
 
 def checker(squares: int = 8, size: int = 64, first: Any = RED, second: Any = BLUE) -> Array:
-    """uint8 (size, size, 3)."""
+    """Return a checker with squares of two colours: uint8 (size, size, 3)."""
     at = np.arange(size) * squares // size
     odd = (at[:, None] + at) % 2 == 1
     return np.where(odd[..., None], np.array(second, np.uint8), np.array(first, np.uint8))
 
 
 def encoded(pixels: Array, kind: str = "png", **options: Any) -> bytes:
-    """An image file of pixels."""
+    """Encode pixels as an image file."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -54,7 +54,7 @@ def encoded(pixels: Array, kind: str = "png", **options: Any) -> bytes:
 
 
 def texture(file: File, image: bytes | str | None = None, **fields: Any) -> int:
-    """A texture of a file: of the encoded bytes of an image, of what a URI names, or a checker."""
+    """Add a texture to a file: an encoded image, the image at a URI, or a checker. Return its index."""
     if isinstance(image, str):
         source = file.add("images", uri=image)
     else:
@@ -63,13 +63,13 @@ def texture(file: File, image: bytes | str | None = None, **fields: Any) -> int:
 
 
 def colored(file: File, image: bytes | str | None = None, **info: Any) -> int:
-    """A material with a base colour texture; `info` goes with the reference to it."""
+    """Add a material with a base colour texture. `info` are further fields of the reference to the texture."""
     base = {"index": texture(file, image), **info}
     return file.add("materials", pbrMetallicRoughness={"baseColorTexture": base, "metallicFactor": 0})
 
 
 def ball_primitive(file: File, material: int | None = None, shift: Any = (0, 0, 0), **fields: Any) -> dict[str, Any]:
-    """A primitive of a ball; a set of texture coordinates, unless `attributes` has another one or None in its place."""
+    """Make a primitive of a ball. `attributes` may replace TEXCOORD_0, or remove it by None."""
     points, uvs, faces = ball()
     own = {"TEXCOORD_0": file.rows(uvs, "VEC2"), **fields.pop("attributes", {})}
     attributes = {name: number for name, number in own.items() if number is not None}
@@ -79,28 +79,28 @@ def ball_primitive(file: File, material: int | None = None, shift: Any = (0, 0, 
 
 
 def checkered(image: bytes | str | None = None, node: dict[str, Any] | None = None, **info: Any) -> File:
-    """The file of a ball with a checker, or another image, on it."""
+    """Make a file of a ball with a checker or another image."""
     file = File()
     file.node(mesh=file.mesh(ball_primitive(file, colored(file, image, **info))), **(node or {}))
     return file
 
 
 def transformed(uvs: Array, offset: Any = (0, 0), rotation: float = 0.0, scale: Any = (1, 1)) -> Array:
-    """What KHR_texture_transform makes of coordinates: translation * rotation * scale of (u, v, 1), by hand."""
+    """Apply KHR_texture_transform to coordinates (N, 2): translation * rotation * scale."""
     cos, sin = math.cos(rotation), math.sin(rotation)
     turn = np.array([[cos, sin], [-sin, cos]])
     return (uvs * scale) @ turn.T + offset
 
 
 def loaded(file: File, path: Path, **options: Any) -> Scene:
-    """A scene of the file, saved in a folder, or under a name; any warning is an error."""
+    """Save a file in a folder or under a name, and load its scene. Any warning is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return load_scene(file.save(path if path.suffix else path / "ball.glb"), **options)
 
 
-def told(source: File | Path, path: Path | None = None, **options: Any) -> tuple[Scene, list[str]]:
-    """A scene of a file, and the warnings that it gave, without the file's name."""
+def scene_and_notes(source: File | Path, path: Path | None = None, **options: Any) -> tuple[Scene, list[str]]:
+    """Load the scene of a file. Return it with its warnings, without the name of the file."""
     if isinstance(source, File):
         assert path is not None
         source = source.save(path if path.suffix else path / "ball.glb")
@@ -113,20 +113,22 @@ def told(source: File | Path, path: Path | None = None, **options: Any) -> tuple
 
 
 def picture(scene: Scene, method: str = "lambert", size: int = 64, **options: Any) -> Array:
-    """What a display shows of a scene, int (H, W, 4)."""
+    """Render a scene for a display: int (H, W, 4), 0 to 255."""
     return render(scene, method, (size, size), **options).display.astype(int)
 
 
 def difference(first: Scene, second: Scene, method: str = "lambert", size: int = 64, **options: Any) -> int:
-    """The largest difference of two pictures, of 255. Raises AssertionError where one shows nothing."""
+    """Return the largest difference of two pictures, 0 to 255. Raises AssertionError if one of them is empty."""
     a, b = (picture(scene, method, size, **options) for scene in (first, second))
-    assert a[..., 3].any() and b[..., 3].any(), "something is seen"
+    assert a[..., 3].any() and b[..., 3].any(), "both pictures show something"
     return int(np.abs(a - b).max())
 
 
 def differing(first: Scene, second: Scene, over: int = 2, size: int = 64, **options: Any) -> float:
-    """The share of pixels whose difference is above so many of 255: outlines and shadows of positions that were
-    rounded may be a pixel off."""
+    """Return the share of pixels whose difference is above `over`, of 255.
+
+    If positions were rounded, outlines and shadows may differ by a pixel.
+    """
     a, b = (picture(scene, size=size, **options) for scene in (first, second))
-    assert a[..., 3].any() and b[..., 3].any(), "something is seen"
+    assert a[..., 3].any() and b[..., 3].any(), "both pictures show something"
     return float((np.abs(a - b).max(axis=2) > over).mean())

@@ -1,6 +1,6 @@
-"""What things cost, as medians and ratios: `make bench`. Not a test: figures depend on the machine.
+"""Benchmarks that print medians and ratios: `make bench`. They are no tests, since times depend on the machine.
 
-Every figure is a median over several runs, with the range of its middle half; first runs, which compile, are dropped.
+Every figure is a median over several runs, with its quartiles. The first runs, which compile shaders, are dropped.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ENOUGH_S = 15.0
 
 @dataclass(frozen=True)
 class Figure:
-    """Seconds per run."""
+    """The times of several runs, in seconds."""
 
     runs: list[float]
 
@@ -52,7 +52,7 @@ class Figure:
 
 
 def measure(run: Callable[[], object], times: int, warm_up: int = 1) -> Figure:
-    """Wall-clock seconds of `run()`, fewer times where they add up to more than ENOUGH_S."""
+    """Measure the wall-clock time of `run()`, up to `times` times and about ENOUGH_S seconds in total."""
     runs: list[float] = []
     while len(runs) < warm_up + times and (len(runs) < warm_up + 3 or sum(runs) < ENOUGH_S):
         start = time.perf_counter()
@@ -62,32 +62,32 @@ def measure(run: Callable[[], object], times: int, warm_up: int = 1) -> Figure:
 
 
 def command(*argv: str, cache: Path) -> Callable[[], object]:
-    """`wgsss` as a process, from start to end."""
+    """Return a function that runs `wgsss` in its own process."""
     env = {**os.environ, "WGSSS_CACHE": str(cache)}
     return lambda: subprocess.run([sys.executable, "-m", "wgsss", *argv], env=env, check=True, capture_output=True)
 
 
-def say(what: str, figure: Figure, goal_s: float = 0.0, against: Figure | None = None) -> None:
-    """A row: the figure, and its ratio to a goal or to another figure."""
+def print_row(label: str, figure: Figure, goal_s: float = 0.0, against: Figure | None = None) -> None:
+    """Print a row: the figure, and its ratio to a goal or to another figure."""
     ratio = f"{figure.median / goal_s:5.2f} of {1e3 * goal_s:g} ms" if goal_s else ""
     ratio = f"{figure.median / against.median:5.2f} x" if against else ratio
-    print(f"{what:46}{figure}  {ratio}".rstrip(), flush=True)
+    print(f"{label:46}{figure}  {ratio}".rstrip(), flush=True)
 
 
 def commands() -> None:
-    """Processes from start to file, with and without what the cache holds."""
+    """Measure commands from start to end, with a warm and a cold cache."""
     with tempfile.TemporaryDirectory() as folder:
         cache, picture = Path(folder, "cache"), str(Path(folder, "ear.png"))
-        say("wgsss --help", measure(command("--help", cache=cache), 9), 0.3)
+        print_row("wgsss --help", measure(command("--help", cache=cache), 9), 0.3)
         render = command("render", "ear", "--size", f"{SIZE[0]}x{SIZE[1]}", "-o", picture, cache=cache)
         cold = measure(render, 1, warm_up=0)
         warm = measure(render, 7)
-        say("wgsss render ear --size 512x512, warm cache", warm, 3.0)
-        say("  the same, cold cache", cold, against=warm)
+        print_row("wgsss render ear --size 512x512, warm cache", warm, 3.0)
+        print_row("  the same, cold cache", cold, against=warm)
 
 
 def encoding(gpu: Gpu) -> None:
-    """What a graph costs Python. The passes draw two texels, so that the device has next to nothing to do."""
+    """Measure the cost of a graph in Python. The passes draw only two texels, so that the device is idle."""
 
     black = gpu.texture(np.zeros((1, 2, 4)), "rgba32float")
 
@@ -96,19 +96,19 @@ def encoding(gpu: Gpu) -> None:
         value = graph.draw("frame/tone_map", size=(2, 1), radiance=black, params={"scale": 1.0, "curve": 0})
         for _ in range(PASSES - 1):
             value = graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})
-        graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})  # not wanted, hence dropped
+        graph.draw("frame/tone_map", radiance=value, params={"scale": 1.0, "curve": 0})  # unused, so it is culled
         graph.run(value)
         assert (len(graph.ran), len(graph.culled)) == (PASSES, 1)
 
     runs = []
     for _ in range(60):
         runs += measure(frame, 1, warm_up=0).runs
-        gpu.fence()  # outside what is measured
-    say(f"declare, cull and encode {PASSES} passes", Figure(runs[10:]), 2e-3)
+        gpu.fence()  # not measured
+    print_row(f"declare, cull and encode {PASSES} passes", Figure(runs[10:]), 2e-3)
 
 
 def methods(gpu: Gpu) -> None:
-    """A frame by each method over its sweep, against Lambert's."""
+    """Measure a frame of each method, over the sweep of its knobs, relative to lambert."""
     scene = load_scene("ear")
     plain = None
     for name in METHODS:
@@ -119,12 +119,12 @@ def methods(gpu: Gpu) -> None:
             figure = measure(lambda renderer=renderer: renderer.frame(timed=False), 7, warm_up=2)  # type: ignore[misc]
             plain = plain or figure
             chosen = " ".join(f"{knob}={value}" for knob, value in knobs.items())
-            say(f"frame of ear by {name} {chosen}".rstrip(), figure, against=plain)
+            print_row(f"frame of ear by {name} {chosen}".rstrip(), figure, against=plain)
             print(f"{'  prepared in':46}{1e3 * baked:9.2f} ms")
 
 
 def octree(gpu: Gpu) -> None:
-    """jensen02 against the sum that it abridges, from about as many samples, in turns: 50 times faster is the goal."""
+    """Compare jensen02 with the full sum over about as many samples. The goal is 50 times the speed."""
     scene, size = load_scene("ear"), (256, 256)
     method = make_method("jensen02", {"spacing": 1.24})
     renderer = Renderer(scene, method, size, gpu)
@@ -132,10 +132,10 @@ def octree(gpu: Gpu) -> None:
 
     def estimate() -> np.ndarray:
         graph = Graph(gpu)
-        drawn = method.passes(begin(graph, stage, size))
-        both = drawn.M_front, drawn.M_back
-        graph.run(*both)
-        return sum(graph.read(handle)[..., :3] for handle in both)
+        layers = method.passes(begin(graph, stage, size))
+        handles = layers.M_front, layers.M_back
+        graph.run(*handles)
+        return sum(graph.read(handle)[..., :3] for handle in handles)
 
     def turn() -> None:
         frames.extend(measure(lambda: renderer.frame(timed=False), 5, warm_up=2).runs)
@@ -145,52 +145,52 @@ def octree(gpu: Gpu) -> None:
     estimates: list[float] = []
     turn()
     with tempfile.TemporaryDirectory() as cache, mock.patch.dict(os.environ, WGSSS_CACHE=cache):
-        with warnings.catch_warnings(action="ignore"):  # so few samples may not be enough
+        with warnings.catch_warnings(action="ignore"):  # there may be too few samples
             start = time.perf_counter()
             reference = integral(stage, size, samples=122_000).M
             summed = Figure([time.perf_counter() - start])
     turn()
-    found = estimate()
-    say("M of ear at 256x256 by integral", summed)
-    for what, runs in (("M by jensen02", estimates), ("a frame by jensen02", frames)):
+    M = estimate()
+    print_row("M of ear at 256x256 by integral", summed)
+    for label, runs in (("M by jensen02", estimates), ("a frame by jensen02", frames)):
         figure = Figure(runs)
-        say(f"  {what}", figure)
+        print_row(f"  {label}", figure)
         print(f"{'    integral takes':46}{summed.median / figure.median:9.2f} times as long")
-    off = errors(found, reference, reference.any(axis=2)).rel_rmse or 0.0
-    print(f"{'  difference, relative RMSE':46}{100 * off:9.2f} %")
+    error = errors(M, reference, reference.any(axis=2)).rel_rmse or 0.0
+    print(f"{'  difference, relative RMSE':46}{100 * error:9.2f} %")
 
 
 def screen_pairs(gpu: Gpu) -> None:
-    """Frames of sam and of jimenez15, which diffuse in screen space alike, in turns: at most 1.1 is the goal."""
+    """Compare frames of sam (surface=screen) and jimenez15, which both diffuse in screen space. The goal is 1.1."""
     head = DATA / "lee_perry_smith" / "LeePerrySmith.obj"
     scenes = {"ear": (load_scene("ear"), [(256, 256), SIZE])}
     if head.is_file():
         scenes["head"] = (load_scene(head, material="skin1", size_mm=430.0), [SIZE])
     for name, (scene, sizes) in scenes.items():
         for size in sizes:
-            ours = Renderer(scene, make_method("sam", {"surface": "screen"}), size, gpu)
-            theirs = Renderer(scene, make_method("jimenez15"), size, gpu)
-            runs: dict[Renderer, list[float]] = {ours: [], theirs: []}
+            sam = Renderer(scene, make_method("sam", {"surface": "screen"}), size, gpu)
+            jimenez = Renderer(scene, make_method("jimenez15"), size, gpu)
+            runs: dict[Renderer, list[float]] = {sam: [], jimenez: []}
             for turn in range(27):
                 for renderer in runs if turn % 2 else reversed(runs):
                     start = time.perf_counter()
                     renderer.frame(timed=False)
-                    if turn >= 2:  # before, it compiles
+                    if turn >= 2:  # the first frames compile shaders
                         runs[renderer].append(time.perf_counter() - start)
-            plain = Figure(runs[theirs])
-            say(f"frame of {name} at {size[0]}x{size[1]} by jimenez15", plain)
-            say("  by sam, surface=screen", Figure(runs[ours]), against=plain)
+            plain = Figure(runs[jimenez])
+            print_row(f"frame of {name} at {size[0]}x{size[1]} by jimenez15", plain)
+            print_row("  by sam, surface=screen", Figure(runs[sam]), against=plain)
 
 
 def photons(gpu: Gpu) -> None:
-    """Photons a second, those of all channels together, against what the reference is meant to reach."""
+    """Measure photons per second, of all channels together, relative to the goal of the reference."""
     slab = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
     skin = Layer((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
     for name, layer, number, goal in (("van de Hulst's slab", slab, 1_000_000, 3e6), ("Skin1", skin, 300_000, 0.4e6)):
         figure = measure(lambda layer=layer, number=number: trace([layer], number, gpu=gpu), 7)  # type: ignore[misc]
         rate = 3 * number / figure.median
-        say(f"3 x {number:,} photons through {name}", figure)
-        print(f"{'  a second':46}{rate / 1e6:9.2f} M   {rate / goal:.2f} of {goal / 1e6:g} M")
+        print_row(f"3 x {number:,} photons through {name}", figure)
+        print(f"{'  per second':46}{rate / 1e6:9.2f} M   {rate / goal:.2f} of {goal / 1e6:g} M")
 
 
 if __name__ == "__main__":

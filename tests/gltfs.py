@@ -1,4 +1,4 @@
-"""glTF files put together for tests: a tree of plain JSON, and the numbers that its accessors name."""
+"""Construction of glTF files for tests: a tree of JSON, and the data of its accessors."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
 
 
 class File:
-    """A glTF file being put together. Methods give back the number by which the file refers to what was added."""
+    """A glTF file under construction. Methods that add an object return its index."""
 
     def __init__(self) -> None:
         self.tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
         self.data = bytearray()
 
     def add(self, collection: str, **fields: Any) -> int:
-        things = self.tree.setdefault(collection, [])
-        things.append(fields)
-        return len(things) - 1
+        """Add an object to a collection such as "nodes"."""
+        items = self.tree.setdefault(collection, [])
+        items.append(fields)
+        return len(items) - 1
 
     def view(self, values: Any, dtype: str = "u1", **fields: Any) -> int:
-        """A buffer view of numbers, or of bytes."""
+        """Add a buffer view of numbers or bytes."""
         data = values if isinstance(values, bytes) else np.ascontiguousarray(values, "<" + dtype).tobytes()
         self.data += bytes(-len(self.data) % 4)
         place = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
@@ -36,7 +37,7 @@ class File:
         return self.add("bufferViews", **{**place, **fields})
 
     def rows(self, values: Any, kind: str, dtype: str = "f4", **fields: Any) -> int:
-        """An accessor with a buffer view of its own."""
+        """Add an accessor with its own buffer view."""
         own = {
             "bufferView": self.view(values, dtype),
             "componentType": CODES[dtype],
@@ -46,32 +47,33 @@ class File:
         return self.add("accessors", **{**own, **fields})
 
     def primitive(self, positions: Any = TETRAHEDRON, faces: Any = FACES, **fields: Any) -> dict[str, Any]:
-        """A primitive; without indices where `faces` is None."""
-        found: dict[str, Any] = {"attributes": {"POSITION": self.rows(positions, "VEC3")}}
+        """Make a primitive, without indices if `faces` is None."""
+        primitive: dict[str, Any] = {"attributes": {"POSITION": self.rows(positions, "VEC3")}}
         if faces is not None:
-            found["indices"] = self.rows(np.ravel(faces), "SCALAR", "u2")
-        found["attributes"].update(fields.pop("attributes", {}))
-        return {**found, **fields}
+            primitive["indices"] = self.rows(np.ravel(faces), "SCALAR", "u2")
+        primitive["attributes"].update(fields.pop("attributes", {}))
+        return {**primitive, **fields}
 
     def mesh(self, *primitives: dict[str, Any], **fields: Any) -> int:
-        """A mesh, of a tetrahedron where nothing is given."""
+        """Add a mesh, by default of a tetrahedron."""
         return self.add("meshes", primitives=list(primitives or [self.primitive()]), **fields)
 
     def node(self, *, root: bool = True, **fields: Any) -> int:
+        """Add a node, by default to the roots of the scene."""
         number = self.add("nodes", **fields)
         if root:
             self.tree["scenes"][0]["nodes"].append(number)
         return number
 
-    def shown(self, **material: Any) -> File:
-        """Itself, with a node that shows a tetrahedron, with texture coordinates and a material."""
+    def with_tetrahedron(self, **material: Any) -> File:
+        """Add a node with a tetrahedron that has texture coordinates and a material. Return the file."""
         uvs = self.rows(TETRAHEDRON[:, :2], "VEC2")
         number = self.add("materials", **material)
         self.node(mesh=self.mesh(self.primitive(attributes={"TEXCOORD_0": uvs}, material=number)))
         return self
 
     def glb(self, *more: tuple[bytes, bytes]) -> bytes:
-        """The file as chunks, some more of them (type and data) between its JSON and its data."""
+        """Return the bytes of a .glb file, with further chunks (type and data) between JSON and data."""
         tree = dict(self.tree)
         if self.data:
             tree.setdefault("buffers", [{"byteLength": len(self.data)}])
@@ -82,7 +84,7 @@ class File:
         return b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunks)).to_bytes(4, "little") + chunks
 
     def save(self, path: Path) -> Path:
-        """As a .glb file, or as a .gltf file whose data lie in a file of the same name."""
+        """Save as .glb, or as .gltf with a .bin file of the same name."""
         if path.suffix == ".glb":
             path.write_bytes(self.glb())
             return path
@@ -94,7 +96,7 @@ class File:
 
 
 def png(pixels: Any = ((255, 0, 0),)) -> bytes:
-    """An image of one row."""
+    """Encode an image of one row."""
     import io
 
     from PIL import Image

@@ -1,4 +1,4 @@
-"""Image files of unusual kinds, made byte by byte: PNG of any depth and filter, plain OpenEXR, Radiance."""
+"""Encoders of unusual image files: PNG of any depth and filter, uncompressed OpenEXR, Radiance."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ _ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), 
 def png(
     pixels: np.ndarray, *, depth: int = 0, palette: Any = None, trns: bytes = b"", interlaced: bool = False
 ) -> bytes:
-    """A PNG of uint8 or uint16 pixels (H, W, C), or of palette indices or grey of fewer bits. Its rows use all filters
-    in turn."""
+    """Encode a PNG of uint8 or uint16 pixels (H, W, C), or of palette indices or grey of fewer bits.
+
+    Its rows use all filters in turn.
+    """
     pixels = pixels if pixels.ndim == 3 else pixels[..., None]
     height, width, channels = pixels.shape
     depth = depth or 8 * pixels.dtype.itemsize
@@ -34,10 +36,12 @@ def png(
 
 
 def chunk(name: bytes, content: bytes) -> bytes:
+    """Make a chunk of a PNG file."""
     return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
 
 
 def _filtered(pixels: np.ndarray, depth: int) -> bytes:
+    """Encode the rows of a PNG file, using all filters in turn."""
     height = len(pixels)
     if depth < 8:
         bits = np.unpackbits(pixels.reshape(height, -1, 1).astype(np.uint8), axis=2)[..., 8 - depth :]
@@ -65,7 +69,7 @@ def exr(
     display: tuple[int, int, int, int] | None = None,
     attributes: Mapping[str, tuple[str, bytes]] | None = None,
 ) -> bytes:
-    """An OpenEXR file without compression. Windows are (left, top, right, bottom), the last two included."""
+    """Encode an OpenEXR file without compression. Windows are (left, top, right, bottom), all inclusive."""
     sampling = sampling or {}
     names = sorted(channels)
     full = next(values for name, values in channels.items() if sampling.get(name, 1) == 1)
@@ -104,17 +108,17 @@ def exr(
 
 
 def chromaticities(*values: float) -> dict[str, tuple[str, bytes]]:
-    """The attribute of an OpenEXR file: x and y of red, green, blue, white."""
+    """Return the attribute of an OpenEXR file for x and y of red, green, blue and white."""
     return {"chromaticities": ("chromaticities", struct.pack("<8f", *values))}
 
 
 def hdr(data: bytes, head: str = "FORMAT=32-bit_rle_rgbe\n", size: str = "-Y 6 +X 12", end: str = "\n") -> bytes:
-    """A Radiance file of encoded pixels."""
+    """Make a Radiance file of encoded pixels."""
     return f"#?RADIANCE\n{head}\n{size}\n".replace("\n", end).encode() + data
 
 
 def run_length(rgbe: np.ndarray) -> bytes:
-    """The new encoding: per row a marker, then each channel as runs (128 + n, value) and literals (n, n values)."""
+    """Encode in the new way: per row a marker, then channels of runs (128 + n, value) and literals (n, n values)."""
     out = bytearray()
     for row in rgbe:
         out += bytes([2, 2, len(row) >> 8, len(row) & 255])

@@ -1,4 +1,4 @@
-"""Small scenes whose light is known in closed form."""
+"""Small scenes with light in closed form."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ABOVE = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=20)
 
 
 def plane(side: float = 40.0, y: float = 0.0, cells: int = 8) -> Mesh:
-    """A square of `side` mm at height y, facing up, with the obvious texture coordinates."""
+    """Make a square of `side` mm at height y that faces up, with texture coordinates along its sides."""
     t = np.linspace(-0.5, 0.5, cells + 1)
     x, z = np.meshgrid(t, t)
     positions = np.stack([x * side, np.full_like(x, y), z * side], axis=-1).reshape(-1, 3)
@@ -31,12 +31,12 @@ def plane(side: float = 40.0, y: float = 0.0, cells: int = 8) -> Mesh:
 def lit(
     *lights: Any, mesh: Mesh | None = None, material: Material = MATTE, camera: Any = ABOVE, extra: tuple = ()
 ) -> Scene:
-    """A scene of one object and what else is in it."""
+    """Make a scene of one object, some lights, and further objects."""
     return Scene("test", (Object(mesh or plane(), material), *extra), lights, camera, tone_map="none")
 
 
 def write_environment(path: Any, pixels: np.ndarray) -> str:
-    """An EXR image of latitude and longitude; returns its path."""
+    """Write a latitude-longitude image as OpenEXR, and return its path."""
     import OpenEXR
 
     channels = {"RGB": np.ascontiguousarray(pixels, np.float32)}

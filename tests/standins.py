@@ -1,4 +1,4 @@
-"""References that take no time: a method's M times a factor."""
+"""Fast stand-ins for references: the M of Lambert times a factor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FACTOR, ERROR = 1.25, 0.02
 
 @dataclass(frozen=True)
 class Scaled(Reference):
-    """What Lambert sees, times `factor`, with a standard error of ERROR of it."""
+    """A reference with the M of Lambert times `factor`, and a standard error of ERROR times M."""
 
     factor: float = field(default=FACTOR, metadata={"unit": "", "range": (0.0, 10.0), "help": ""})
 
@@ -31,9 +31,9 @@ class Scaled(Reference):
 
 
 class Volume(Scaled):
-    """The same under another name."""
+    """The same reference with another name."""
 
 
 def lambert(scene: Scene, size: tuple[int, int], time: float = 0.0) -> np.ndarray:
-    """M (H, W, 3) of Lambert's method."""
+    """Render M (H, W, 3) by the method lambert."""
     return Renderer(scene, make_method("lambert"), size).frame(time, ("M_front",), timed=False).aovs["M_front"]

@@ -1,4 +1,4 @@
-"""Damaged and strange input of every kind, by a seed."""
+"""Random damaged and strange input of every kind."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import OpenEXR
 from PIL import Image
 
 Input = tuple[list[str], dict[str, bytes]]
-"""arguments of a command, and the files that it finds"""
+"""arguments of a command, and the contents of its files by name"""
 
 STRANGE = (
     *("0", "-1", "2.5", "1e-300", "1e-9", "1e9", "1e15", "1e30", "1e300", "1e999", "inf", "-inf", "nan", "true", '""'),
@@ -111,7 +111,7 @@ def box() -> tuple[np.ndarray, np.ndarray]:
 
 
 def meshes() -> dict[str, bytes]:
-    """A box in every format."""
+    """Return a box as a file of every format."""
     corners, faces = box()
     head = f"element vertex {len(corners)}\nproperty float x\nproperty float y\nproperty float z\n"
     head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
@@ -147,7 +147,7 @@ def meshes() -> dict[str, bytes]:
 
 
 def images() -> dict[str, bytes]:
-    """Skies, and a texture."""
+    """Return two skies and a texture as files."""
     rgbe = np.full((8, 16, 4), 128, np.uint8)
     rgbe[..., :3] = np.arange(128).reshape(8, 16, 1)
     stream, exr = io.BytesIO(), io.BytesIO()
@@ -163,30 +163,32 @@ def images() -> dict[str, bytes]:
 
 
 def damaged(chance: random.Random, data: bytes) -> bytes:
-    """Cut, with bytes changed, put in or taken out."""
-    found = bytearray(data)
+    """Cut data, or change, insert or remove bytes."""
+    changed = bytearray(data)
     for _ in range(chance.choice((1, 1, 2, 8))):
-        at = chance.randrange(len(found) + 1)
+        at = chance.randrange(len(changed) + 1)
         how = chance.randrange(6)
         if how == 0:
-            del found[at:]
+            del changed[at:]
         elif how == 1:
-            del found[at : at + chance.randrange(1, 40)]
+            del changed[at : at + chance.randrange(1, 40)]
         elif how == 2:
-            found[at:at] = chance.randbytes(chance.randrange(1, 9))
+            changed[at:at] = chance.randbytes(chance.randrange(1, 9))
         elif how == 3:
-            found[at : at + 4] = chance.choice((b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\xc0\x7f"))
-        elif how == 4 and at < len(found):
-            found[at] ^= 1 << chance.randrange(8)
+            changed[at : at + 4] = chance.choice(
+                (b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\xc0\x7f")
+            )
+        elif how == 4 and at < len(changed):
+            changed[at] ^= 1 << chance.randrange(8)
         else:
-            found[at:at] = chance.choice(
+            changed[at:at] = chance.choice(
                 (b"\n", b"\0", b"\xef\xbb\xbf", b"-", b"1e999", b'"', b"}", b"[" * 999, b"nan")
             )
-    return bytes(found)
+    return bytes(changed)
 
 
 def altered(chance: random.Random, text: str) -> bytes:
-    """TOML in which a value is another one, a line is twice there, or bytes are damaged."""
+    """Change TOML text: replace a value, rename a key, repeat a line, or damage bytes."""
     lines = text.splitlines()
     values = [i for i, line in enumerate(lines) if " = " in line]
     at = chance.choice(values)

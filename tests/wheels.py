@@ -1,8 +1,8 @@
-"""Prints, as JSON, of which versions of packages there are wheels for each machine: {machine: {package: [version, …]}}.
+"""Print, as JSON, the versions of packages that have wheels for each machine: {machine: {package: [version, …]}}.
 
-Run in a process of its own, with the names of the packages. It asks the indexes that pip is set up to use, once for
-each package, where `pip install --dry-run --platform …` would ask again for each machine and take a minute or two. pip
-has no public way to do so: this uses its internal one.
+The script runs in its own process, with the names of the packages as arguments. It queries the indexes that pip is
+configured to use once for each package. `pip install --dry-run --platform …` would query them for each machine, and
+take a minute or two. pip has no public interface for this, so the script uses internal functions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pip._internal.utils.compatibility_tags import get_supported
 from pip._internal.utils.packaging import check_requires_python
 
 PYTHONS = ((3, 11), (3, 12), (3, 13), (3, 14))
-GLIBC = range(17, 29)  # up to 2.28, which Debian 10, Ubuntu 20.04 and RHEL 8 have or surpass
+GLIBC = range(17, 29)  # up to 2.28, the version of Debian 10 and RHEL 8
 PLATFORMS = {
     "Linux x86_64": ["manylinux2014_x86_64", *(f"manylinux_2_{n}_x86_64" for n in GLIBC)],
     "Linux aarch64": ["manylinux2014_aarch64", *(f"manylinux_2_{n}_aarch64" for n in GLIBC)],
@@ -37,11 +37,11 @@ MACHINES = {
 TAGS = {
     name: set(get_supported("".join(map(str, python)), platforms)) for name, (python, platforms) in MACHINES.items()
 }
-"""of the wheels that run on each machine"""
+"""tags of the wheels that run on each machine"""
 
 
 class _AnyMachine(TargetPython):
-    """Takes the place of the one machine that pip would look for wheels for."""
+    """A target for pip that accepts the wheels of all machines."""
 
     @cached_property
     def _all(self) -> set[Any]:
@@ -58,16 +58,16 @@ def main(names: list[str]) -> None:
     options, _ = command.parse_args(["--retries=1", "--timeout=20", "--only-binary=:all:", *names])
     with command.main_context():
         finder = command._build_package_finder(options, command.get_default_session(options), _AnyMachine(), True)
-        wheels = {name: [found.link for found in finder.find_all_candidates(name)] for name in names}
+        wheels = {name: [candidate.link for candidate in finder.find_all_candidates(name)] for name in names}
 
     def versions(machine: str, name: str) -> list[str]:
-        """Of a package on a machine."""
+        """Return the versions of a package that have a wheel for a machine."""
         python, tags = (*MACHINES[machine][0], 0), TAGS[machine]
-        found = ((Wheel(link.filename), link) for link in wheels[name])
+        candidates = ((Wheel(link.filename), link) for link in wheels[name])
         return sorted(
             {
                 w.version
-                for w, link in found
+                for w, link in candidates
                 if w.supported(tags) and check_requires_python(link.requires_python, python)
             }
         )

@@ -1,4 +1,4 @@
-"""Scenes far from the origin, meshes too small or too large for the light in them, and meshes of very many faces."""
+"""Scenes far from the origin, meshes too small or too large for their material, and meshes with many faces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import RADIUS, ball, ball_primitive, checkered, colored, difference, loaded, picture, told
+from balls import RADIUS, ball, ball_primitive, checkered, colored, difference, loaded, picture, scene_and_notes
 from gltfs import File
 
 from wgsss import render
@@ -25,7 +25,7 @@ def near(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def surface(scene: Scene, offset: Any = (0, 0, 0)) -> Array:
-    """The normals that a camera sees that is moved by an offset, mm. (Shadows are coarse in scenes of a kilometre.)"""
+    """Render the normals from a camera moved by an offset, mm. (Shadows are coarse in scenes of a kilometre.)"""
     camera = scene.camera
     eye, target = (tuple(np.add(point, offset).tolist()) for point in (camera.eye, camera.target))
     seen = replace(scene, camera=replace(camera, eye=eye, target=target))
@@ -36,15 +36,15 @@ def surface(scene: Scene, offset: Any = (0, 0, 0)) -> Array:
 
 
 @pytest.mark.parametrize("offset", [(1000, 0, 0), (-3000, 2000, -500), (0, -2e5, 0), (6371000, 0, 0)])
-def test_a_mesh_far_away_is_drawn_as_at_the_origin(tmp_path: Path, near: Scene, offset: Any) -> None:
-    """By a node that stands there, in metres."""
+def test_a_mesh_far_away_is_drawn_like_one_at_the_origin(tmp_path: Path, near: Scene, offset: Any) -> None:
+    """A node translates the mesh, in metres."""
     scene = loaded(checkered(node={"translation": list(offset)}), tmp_path)
     np.testing.assert_allclose(scene.bounds.mean(axis=0), np.multiply(offset, 1000), atol=1)
     assert difference(scene, near) <= 1
 
 
-def test_far_positions_in_the_mesh_itself(tmp_path: Path) -> None:
-    """Written as float32, 1000 m away: what precision the file has is kept, steps of 0.06 mm."""
+def test_positions_of_a_mesh_may_be_far_from_the_origin(tmp_path: Path) -> None:
+    """Positions are float32 and 1000 m away. The precision of the file, 0.06 mm, is kept."""
     file = File()
     file.node(mesh=file.mesh(ball_primitive(file, colored(file), (1000, 0, 0))))
     scene = loaded(file, tmp_path)
@@ -55,7 +55,7 @@ def test_far_positions_in_the_mesh_itself(tmp_path: Path) -> None:
     assert difference(scene, loaded(expected, tmp_path)) <= 1
 
 
-def test_a_far_mesh_whose_length_is_given(tmp_path: Path) -> None:
+def test_a_far_mesh_is_scaled_to_a_length(tmp_path: Path) -> None:
     near_one, far_one = (
         loaded(checkered(node=node), tmp_path, size_mm=30) for node in ({}, {"translation": [1000, -50, 20]})
     )
@@ -64,15 +64,14 @@ def test_a_far_mesh_whose_length_is_given(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("same", [True, False])
-def test_a_far_part_beside_a_near_one(tmp_path: Path, near: Scene, same: bool) -> None:
-    """Seen by a camera beside it, the part that is 1 km away is as one at the origin, whether or not the two wear the
-    same material."""
+def test_a_far_part_and_a_near_part(tmp_path: Path, near: Scene, same: bool) -> None:
+    """A camera near the part 1 km away sees it like one at the origin, with the same or another material."""
     file = File()
     first = colored(file)
     second = first if same else colored(file)
     file.node(mesh=file.mesh(ball_primitive(file, first)))
     file.node(mesh=file.mesh(ball_primitive(file, second)), translation=[1000, 0, 0])
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert np.ptp(scene.bounds, axis=0)[0] == pytest.approx(1e6, rel=1e-3)
     assert all("long and light spreads" in line for line in lines)
     expected = surface(near)
@@ -81,7 +80,7 @@ def test_a_far_part_beside_a_near_one(tmp_path: Path, near: Scene, same: bool) -
 
 
 def test_a_far_part_that_moves(tmp_path: Path) -> None:
-    """By a turning node, at any time."""
+    """A rotating node moves the part."""
     scenes = []
     for offset in ((0, 0, 0), (1000, 0, -2000)):
         file = checkered(node={"translation": list(offset)})
@@ -95,7 +94,7 @@ def test_a_far_part_that_moves(tmp_path: Path) -> None:
 
 
 def test_a_far_mesh_in_a_scene_file(tmp_path: Path) -> None:
-    """It is turned about the origin and then moved, by the scene file; what brings it back is the near picture."""
+    """The scene file rotates the mesh about the origin and translates it back."""
     checkered(node={"translation": [1000, 0, 0]}).save(tmp_path / "far.glb")
     checkered().save(tmp_path / "near.glb")
     place = "rotate = [0, 0, 90]\ntranslate = [{}, {}, 7]\n"
@@ -121,26 +120,26 @@ def test_a_far_mesh_in_a_scene_file(tmp_path: Path) -> None:
     ],
 )
 def test_a_mesh_too_large_or_too_small_for_the_light_in_it(tmp_path: Path, size_mm: float, effect: str) -> None:
-    """Light spreads 19.5 mm in marble: a tenth of that is the least, and a thousand times that the greatest."""
-    scene, lines = told(checkered(), tmp_path, size_mm=size_mm)
+    """Light spreads 19.5 mm in marble. The limits are a tenth and a thousand times that length."""
+    scene, lines = scene_and_notes(checkered(), tmp_path, size_mm=size_mm)
     if not effect:
         assert lines == []
         return
     assert len(lines) == 1 and effect in lines[0] and "marble" in lines[0] and "--size-mm" in lines[0]
     fit = float(re.search(r"--size-mm (\S+) ", lines[0])[1])
-    assert told(tmp_path / "ball.glb", size_mm=fit)[1] == [], "what it advises is of the right size"
+    assert scene_and_notes(tmp_path / "ball.glb", size_mm=fit)[1] == [], "the advised size is accepted"
     assert scene.objects
 
 
-def test_the_warning_is_about_the_material_that_is_worn(tmp_path: Path) -> None:
+def test_the_size_warning_is_about_the_chosen_material(tmp_path: Path) -> None:
     path = checkered().save(tmp_path / "ball.glb")
-    assert told(path)[1] == []
+    assert scene_and_notes(path)[1] == []
     dense = {"sigma_a": [10, 10, 10], "sigma_s_prime": [1000, 1000, 1000]}
-    assert len(told(path, material=dense)[1]) == 1
-    assert told(path, material=dense, size_mm=0.1)[1] == []
+    assert len(scene_and_notes(path, material=dense)[1]) == 1
+    assert scene_and_notes(path, material=dense, size_mm=0.1)[1] == []
 
 
-def test_the_warning_in_a_scene_file_names_the_mesh(tmp_path: Path) -> None:
+def test_the_size_warning_of_a_scene_file_names_the_mesh(tmp_path: Path) -> None:
     checkered().save(tmp_path / "ball.glb")
     (tmp_path / "scene.toml").write_text('[[object]]\nmesh = "ball.glb"\nsize_mm = 90000\n')
     with pytest.warns(UserWarning, match=r"^ball\.glb: the mesh is .*opaque"):
@@ -154,21 +153,19 @@ def counts(mesh: Mesh) -> tuple[int, int]:
     return len(mesh.positions), len(mesh.faces)
 
 
-def test_a_mesh_that_no_device_holds_is_refused_with_the_way_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mesh_too_large_for_a_device_is_refused_with_advice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = checkered().save(tmp_path / "ball.glb")
     vertices, faces = counts(load_scene(path).objects[0].mesh)
     monkeypatch.setattr(bodies, "MOST_VERTICES", vertices - 20)
     with pytest.raises(InputError, match=rf"ball\.glb: .*{faces} faces.* --simplify \d+") as raised:
         load_scene(path)
     advised = int(re.search(r"--simplify (\d+)", str(raised.value))[1])
-    scene, lines = told(path, simplify=advised)
+    scene, lines = scene_and_notes(path, simplify=advised)
     assert len(scene.objects[0].mesh.faces) <= advised and any("simplified" in line for line in lines)
 
 
-def test_vertices_that_are_split_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each corner of a mesh of hard edges is a vertex of its own to the device."""
+def test_split_vertices_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each corner of a mesh with hard edges is a separate vertex on the device."""
     points, _, faces = ball(RADIUS, 6, 4)
     corners = points[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -182,26 +179,26 @@ def test_vertices_that_are_split_count(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(InputError, match=r"--simplify \d+") as raised:
         load_scene(path)
     advised = int(re.search(r"--simplify (\d+)", str(raised.value))[1])
-    assert len(told(path, simplify=advised)[0].objects[0].mesh.faces) <= advised < len(faces)
+    assert len(scene_and_notes(path, simplify=advised)[0].objects[0].mesh.faces) <= advised < len(faces)
 
 
-def test_duplicate_vertices_do_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Triangles that share no vertices, as in STL files, are welded first."""
+def test_duplicate_vertices_are_not_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Triangles without shared vertices, as in STL files, are welded first."""
     points, _, faces = ball()
     file = File()
     file.node(mesh=file.mesh(file.primitive(points[faces].reshape(-1, 3), None)))
     monkeypatch.setattr(bodies, "MOST_VERTICES", len(faces))
-    assert len(told(file, tmp_path)[0].objects[0].mesh.faces) == len(faces)
+    assert len(scene_and_notes(file, tmp_path)[0].objects[0].mesh.faces) == len(faces)
 
 
 @pytest.mark.parametrize("faces", [100, 200])
-def test_a_simplified_ball_is_still_one(tmp_path: Path, near: Scene, faces: int) -> None:
-    scene, lines = told(checkered(), tmp_path, simplify=faces)
+def test_a_simplified_ball_is_still_a_ball(tmp_path: Path, near: Scene, faces: int) -> None:
+    scene, lines = scene_and_notes(checkered(), tmp_path, simplify=faces)
     mesh = scene.objects[0].mesh
     assert abs(len(mesh.faces) - faces) <= 2
     without = "without textures, texture coordinates"
     assert lines == [f"simplified to {len(mesh.faces)} of {len(ball()[2])} faces, {without}"]
-    assert scene.objects[0].material.maps.base_color is None, "there is no place on the surface for a texel"
+    assert scene.objects[0].material.maps.base_color is None, "textures are left out without texture coordinates"
     assert np.linalg.norm(mesh.positions, axis=1) == pytest.approx(50, abs=4)
     ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     assert (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
@@ -209,12 +206,12 @@ def test_a_simplified_ball_is_still_one(tmp_path: Path, near: Scene, faces: int)
     assert (outline[0] != outline[1]).mean() < 0.05
 
 
-def test_simplify_leaves_what_has_few_faces(tmp_path: Path, near: Scene) -> None:
+def test_simplify_keeps_meshes_with_few_faces(tmp_path: Path, near: Scene) -> None:
     assert difference(loaded(checkered(), tmp_path, simplify=100000), near) == 0
 
 
-def test_simplify_is_for_each_part_and_says_what_it_loses(tmp_path: Path) -> None:
-    """A large part with all that a part can have, and a small one, whose texture stays."""
+def test_simplify_applies_to_each_part_and_notes_losses(tmp_path: Path) -> None:
+    """A large part has all attributes of a part. A small part keeps its texture."""
     file = File()
     material = colored(file)
     points, uvs, faces = ball(RADIUS, 6, 5)
@@ -229,9 +226,9 @@ def test_simplify_is_for_each_part_and_says_what_it_loses(tmp_path: Path) -> Non
     times, places = file.rows([0, 1], "SCALAR"), file.rows([(0, 0, 0), (0, 0.1, 0)], "VEC3")
     channel = {"sampler": 0, "target": {"node": node, "path": "translation"}}
     file.add("animations", channels=[channel], samplers=[{"input": times, "output": places}])
-    scene, lines = told(file, tmp_path, simplify=80)
-    kept, reduced = scene.objects
-    assert kept.material.maps.base_color is not None and kept.mesh.corner_uvs is not None
+    scene, lines = scene_and_notes(file, tmp_path, simplify=80)
+    unchanged, reduced = scene.objects
+    assert unchanged.material.maps.base_color is not None and unchanged.mesh.corner_uvs is not None
     assert reduced.motion is None and reduced.mesh.corner_colors is None and len(reduced.mesh.faces) <= 82
     assert len(lines) == 1 and lines[0].startswith("large: simplified to ")
     assert "vertex colours" in lines[0] and "motion" in lines[0] and isinstance(scene.camera, PerspectiveCamera)

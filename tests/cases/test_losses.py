@@ -1,5 +1,4 @@
-"""Nothing of a file is lost in silence: what is not used is named once, and a file all of which is used gives no
-warning."""
+"""Each unused property of a file is noted once, and a file that is used completely gives no warning."""
 
 from __future__ import annotations
 
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import RADIUS, ball, ball_primitive, checker, checkered, colored, encoded, loaded, texture, told
+from balls import RADIUS, ball, ball_primitive, checker, checkered, colored, encoded, loaded, scene_and_notes, texture
 from gltfs import File
 
 from wgsss.cli import main
@@ -36,7 +35,7 @@ HARMLESS = {"KHR_materials_emissive_strength": {"emissiveStrength": 2}, "KHR_xmp
 
 
 def everything() -> File:
-    """A ball with all that a glTF file can have and wgsss has no use for."""
+    """Make a ball with all properties of glTF files that wgsss does not use."""
     file, (points, uvs, _) = File(), ball()
     count = len(points)
     textures = [texture(file, encoded(checker(size=8 + number))) for number in range(5)]
@@ -94,8 +93,8 @@ def everything() -> File:
         {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0"}}},
     )
     channels = [{"sampler": 0, "target": target} for target in targets]
-    for name, some in (("Walk", channels), ("Run", channels[:1])):
-        file.add("animations", name=name, channels=some, samplers=[{"input": times, "output": places}])
+    for name, played in (("Walk", channels), ("Run", channels[:1])):
+        file.add("animations", name=name, channels=played, samplers=[{"input": times, "output": places}])
     return file
 
 
@@ -139,23 +138,23 @@ EACH_ONCE: tuple[tuple[str, ...], ...] = (
 )
 
 
-def test_all_that_is_not_used_is_named_once(tmp_path: Path) -> None:
-    lines = told(everything(), tmp_path)[1]
+def test_each_unused_property_is_noted_once(tmp_path: Path) -> None:
+    lines = scene_and_notes(everything(), tmp_path)[1]
     for words in EACH_ONCE:
         naming = [line for line in lines if all(word in line for word in words)]
         assert len(naming) == 1, f"{words}: {naming}"
-    assert len(lines) == len(EACH_ONCE), "and nothing else is said"
+    assert len(lines) == len(EACH_ONCE), "there are no further notes"
     for name in (*HARMLESS, "TANGENT"):
-        assert not any(name in line for line in lines), f"{name} changes nothing that is seen here"
+        assert not any(name in line for line in lines), f"{name} does not change the picture"
 
 
-def test_json_holds_the_same_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_the_same_notes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = everything().save(tmp_path / "ball.glb")
-    lines = [f"ball.glb: {line}" for line in told(path)[1]]
+    lines = [f"ball.glb: {line}" for line in scene_and_notes(path)[1]]
     assert main(["info", str(path), "--json"]) == 0
     out, err = capsys.readouterr()
     assert json.loads(out)["notes"] == lines
-    assert err == "", "it is what was asked for, and not a warning beside it"
+    assert err == "", "the notes are part of the result, and no warnings"
     picture = tmp_path / "ball.png"
     assert main(["render", str(path), "--json", "--method", "lambert", "--size", "8x8", "-o", str(picture)]) == 0
     out, err = capsys.readouterr()
@@ -163,7 +162,7 @@ def test_json_holds_the_same_lines(tmp_path: Path, capsys: pytest.CaptureFixture
     assert err.splitlines() == [f"wgsss: warning: {line}" for line in lines]
 
 
-def test_what_two_parts_lose_alike_is_one_line(tmp_path: Path) -> None:
+def test_equal_losses_of_two_parts_are_one_note(tmp_path: Path) -> None:
     file = File()
     bumps = texture(file, encoded(np.full((2, 2, 3), 128, np.uint8)))
     base = {"baseColorTexture": {"index": texture(file)}, "metallicFactor": 0}
@@ -171,10 +170,10 @@ def test_what_two_parts_lose_alike_is_one_line(tmp_path: Path) -> None:
     for shift in (0, 0.2, 0.4):
         attributes = {"TEXCOORD_1": file.rows(ball()[1] * 2, "VEC2")}
         file.node(mesh=file.mesh(ball_primitive(file, material, (shift, 0, 0), attributes=attributes)))
-    assert len(told(file, tmp_path)[1]) == 1
+    assert len(scene_and_notes(file, tmp_path)[1]) == 1
 
 
-# --- files all of which is used --------------------------------------------------------------------------------------
+# --- files that are used completely ----------------------------------------------------------------------------------
 
 
 def bare() -> File:
@@ -184,7 +183,7 @@ def bare() -> File:
 
 
 def full() -> File:
-    """All that is used: two materials, textures of three kinds, a transform, a medium, colours, and an animation."""
+    """Make a file with all properties that are used: two materials, textures, a transform, a medium, an animation."""
     file = File()
     uvs = file.rows(ball()[1], "VEC2")
     normal = texture(file, encoded(np.full((2, 2, 3), (128, 128, 255), np.uint8)))
@@ -224,23 +223,23 @@ def full() -> File:
 
 
 @pytest.mark.parametrize("make", [bare, checkered, full])
-def test_a_file_all_of_which_is_used_gives_no_warning(tmp_path: Path, make: Callable[[], File]) -> None:
+def test_a_file_that_is_used_completely_gives_no_warning(tmp_path: Path, make: Callable[[], File]) -> None:
     assert loaded(make(), tmp_path).objects
 
 
 # --- extensions that a file requires ---------------------------------------------------------------------------------
 
 
-def test_a_required_extension_that_is_not_known_is_an_error_that_names_it(tmp_path: Path) -> None:
+def test_an_unknown_required_extension_is_an_error_that_names_it(tmp_path: Path) -> None:
     file = checkered()
     file.tree["extensionsUsed"] = file.tree["extensionsRequired"] = ["VENDOR_unknown"]
     with pytest.raises(InputError, match=r"ball\.glb: it requires VENDOR_unknown"):
         load_scene(file.save(tmp_path / "ball.glb"))
 
 
-def test_an_optional_one_is_a_warning_where_it_is_used(tmp_path: Path) -> None:
+def test_an_unknown_optional_extension_in_use_is_a_warning(tmp_path: Path) -> None:
     file = checkered()
     file.tree["extensionsUsed"] = ["VENDOR_unknown", "VENDOR_nowhere"]
     file.tree["nodes"][0]["extensions"] = {"VENDOR_unknown": {}}
-    lines = told(file, tmp_path)[1]
+    lines = scene_and_notes(file, tmp_path)[1]
     assert len(lines) == 1 and "VENDOR_unknown" in lines[0]

@@ -1,4 +1,4 @@
-"""Leaves: quads whose picture's alpha says where the surface is, by glTF's alphaMode MASK."""
+"""Leaves: quads that are cut by the alpha of their texture (glTF alphaMode MASK)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import difference, encoded, picture, texture, told, transformed
+from balls import difference, encoded, picture, scene_and_notes, texture, transformed
 from gltfs import File
 
 from wgsss import render
@@ -18,22 +18,22 @@ from wgsss.scene import DirectionalLight, Mesh, OrthographicCamera, Scene, load_
 Array = np.ndarray[Any, Any]
 
 SIDE = 0.1  # metres
-A, B = 0.24, 0.4  # half axes of the ellipse, of the quad's side
+A, B = 0.24, 0.4  # half axes of the ellipse, as shares of the side of the quad
 GREEN = (30, 120, 20)
 
 
 def leaf(size: int = 64, low: int = 0, soft: bool = False) -> Array:
-    """uint8 (size, size, 4): a green ellipse where alpha is 255, and `low` around it."""
+    """Return uint8 (size, size, 4): green, with alpha 255 in an ellipse and `low` around it."""
     t = (np.arange(size) + 0.5) / size - 0.5
     r = np.hypot(t[None, :] / A, t[:, None] / B)
     share = np.clip((1 - r) * 3 + 0.5, 0, 1) if soft else (r < 1).astype(float)
-    found = np.empty((size, size, 4), np.uint8)
-    found[..., :3], found[..., 3] = GREEN, np.round(low + (255 - low) * share)
-    return found
+    image = np.empty((size, size, 4), np.uint8)
+    image[..., :3], image[..., 3] = GREEN, np.round(low + (255 - low) * share)
+    return image
 
 
 def material_of(file: File, image: Array, **fields: Any) -> int:
-    """A masked material; fields beside `info`, for the texture, and `alpha`, are its own."""
+    """Add a masked material. `info` and `sampling` are fields of the texture, `alpha` is that of the base colour."""
     base = {"index": texture(file, encoded(image), **fields.pop("sampling", {})), **fields.pop("info", {})}
     pbr = {"baseColorTexture": base, "metallicFactor": 0}
     if "alpha" in fields:
@@ -42,7 +42,7 @@ def material_of(file: File, image: Array, **fields: Any) -> int:
 
 
 def quad(file: File, material: int, shift: Any = (0, 0, 0), uvs: Any = None, **fields: Any) -> dict[str, Any]:
-    """An upright square that faces +z."""
+    """Make an upright square that faces +z."""
     corners = np.array([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)]) * SIDE + shift
     own = [(0, 1), (1, 1), (1, 0), (0, 0)] if uvs is None else uvs
     attributes = {"TEXCOORD_0": file.rows(own, "VEC2"), **fields.pop("attributes", {})}
@@ -56,13 +56,13 @@ def masked(image: Array | None = None, uvs: Any = None, **material: Any) -> File
 
 
 def area(mesh: Mesh) -> float:
-    """Of the quad's."""
+    """Return the area of a mesh as a share of the area of the quad."""
     return mesh.area / (SIDE * 1000) ** 2
 
 
 def cut(file: File, path: Path, **options: Any) -> Scene:
-    """The scene of a leaf, whose only warning is of its open edge."""
-    scene, lines = told(file, path, **options)
+    """Load the scene of a leaf. Its only warnings are about boundary edges."""
+    scene, lines = scene_and_notes(file, path, **options)
     assert all("boundary edge" in line for line in lines), lines
     return scene
 
@@ -70,7 +70,7 @@ def cut(file: File, path: Path, **options: Any) -> Scene:
 ELLIPSE = math.pi * A * B
 
 
-def test_a_leaf_is_its_ellipse(tmp_path: Path) -> None:
+def test_a_leaf_is_cut_to_its_ellipse(tmp_path: Path) -> None:
     scene = cut(masked(), tmp_path)
     assert area(scene.objects[0].mesh) == pytest.approx(ELLIPSE, rel=0.02)
     seen = picture(scene, size=96)[..., 3] > 0
@@ -91,7 +91,7 @@ def test_a_leaf_is_its_ellipse(tmp_path: Path) -> None:
         ({"alpha": 0.8}, 1 - 0.125 / 3),
     ],
 )
-def test_the_outline_is_where_alpha_is_the_cutoff(tmp_path: Path, material: dict[str, Any], radius: float) -> None:
+def test_the_outline_follows_the_alpha_cutoff(tmp_path: Path, material: dict[str, Any], radius: float) -> None:
     scene = cut(masked(leaf(soft=True, size=128), **material), tmp_path)
     assert area(scene.objects[0].mesh) == pytest.approx(ELLIPSE * radius**2, rel=0.01)
 
@@ -107,8 +107,8 @@ def test_the_outline_is_where_alpha_is_the_cutoff(tmp_path: Path, material: dict
         (leaf(), {"alphaMode": "OPAQUE", "alphaCutoff": 0.9, "alpha": 0.1}),
     ],
 )
-def test_the_whole_quad_is_kept(tmp_path: Path, image: Array, material: dict[str, Any]) -> None:
-    """An image without alpha, one above the cutoff everywhere, a cutoff of 0, and no mask at all."""
+def test_a_mask_without_effect_keeps_the_whole_quad(tmp_path: Path, image: Array, material: dict[str, Any]) -> None:
+    """The image has no alpha, or its alpha is above the cutoff, or the cutoff is 0, or there is no mask."""
     mesh = cut(masked(image, **material), tmp_path).objects[0].mesh
     assert len(mesh.faces) == 2 and area(mesh) == pytest.approx(1)
 
@@ -124,11 +124,11 @@ def test_a_mask_that_leaves_nothing_is_an_error(tmp_path: Path, image: Array, ma
             load_scene(path)
 
 
-def test_a_mask_that_leaves_nothing_of_one_of_two_materials_is_said(tmp_path: Path) -> None:
+def test_a_mask_that_removes_one_of_two_materials_is_noted(tmp_path: Path) -> None:
     file = File()
     gone = material_of(file, (leaf() * [1, 1, 1, 0]).astype(np.uint8), name="gone")
     file.node(mesh=file.mesh(quad(file, gone), quad(file, material_of(file, leaf()), (0.2, 0, 0))))
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert len(scene.objects) == 1 and scene.bounds[0, 0] > 100
     assert [line for line in lines if "boundary" not in line] == [
         "gone: nothing is drawn where alpha is below 0.5, which is everywhere"
@@ -144,8 +144,8 @@ def test_a_mask_that_leaves_nothing_of_one_of_two_materials_is_said(tmp_path: Pa
         {"rotation": 0.5, "offset": [0.1, -0.2], "scale": [2, 1]},
     ],
 )
-def test_a_mask_lies_as_the_texture_transform_says(tmp_path: Path, transform: dict[str, Any]) -> None:
-    """As on coordinates that hold the transform."""
+def test_a_mask_follows_the_texture_transform(tmp_path: Path, transform: dict[str, Any]) -> None:
+    """The result is that of transformed coordinates."""
     baked = transformed(np.array([(0, 1), (1, 1), (1, 0), (0, 0)]), **transform)
     by_info = masked(leaf(128), info={"extensions": {"KHR_texture_transform": transform}})
     scenes = [cut(file, tmp_path) for file in (by_info, masked(leaf(128), baked))]
@@ -156,16 +156,16 @@ def test_a_mask_lies_as_the_texture_transform_says(tmp_path: Path, transform: di
 
 
 @pytest.mark.parametrize(("wrap", "share"), [(10497, 9.0), (33648, 9.0), (33071, 1.0)])
-def test_a_mask_repeats_as_its_sampler_says(tmp_path: Path, wrap: int, share: float) -> None:
-    """Coordinates from -1 to 2: nine leaves, or one, with its borders drawn out where they are clamped."""
+def test_a_mask_repeats_according_to_its_sampler(tmp_path: Path, wrap: int, share: float) -> None:
+    """Coordinates from -1 to 2 show nine leaves if they repeat, and one leaf if they are clamped."""
     uvs = np.array([(0, 1), (1, 1), (1, 0), (0, 0)]) * 3 - 1
     file = masked(leaf(96), uvs, sampling={"sampler": 0})
     file.add("samplers", wrapS=wrap, wrapT=wrap)
     assert area(cut(file, tmp_path).objects[0].mesh) == pytest.approx(ELLIPSE * share / 9, rel=0.02)
 
 
-def test_a_mask_of_texels_that_are_not_interpolated_has_square_corners(tmp_path: Path) -> None:
-    """Four by four texels, of which four in the middle are there: with NEAREST a square, as leaves of block worlds."""
+def test_a_mask_without_interpolation_has_square_corners(tmp_path: Path) -> None:
+    """Of four by four texels, the four in the middle are opaque. With NEAREST, they give a square."""
     image = np.zeros((4, 4, 4), np.uint8)
     image[1:3, 1:3] = 255
     file = masked(image, sampling={"sampler": 0})
@@ -173,12 +173,14 @@ def test_a_mask_of_texels_that_are_not_interpolated_has_square_corners(tmp_path:
     mesh = cut(file, tmp_path).objects[0].mesh
     assert area(mesh) == pytest.approx(0.25, rel=0.03)
     corners = np.abs(mesh.positions[:, :2] / 1000 / SIDE).sum(axis=1)
-    assert corners.max() > 0.47, "of 0.5: the corners are there, and not cut off"
+    assert corners.max() > 0.47, "corners, at 0.5, are not cut off"
 
 
 def test_a_mask_on_a_skinned_and_animated_leaf_moves_with_it(tmp_path: Path) -> None:
-    """What is cut out lies on the quad at every time: its points are where the quad's are that have their coordinates.
-    The quad's upper half hangs on a joint that turns."""
+    """The cut leaf lies on the quad at every time: points with equal texture coordinates coincide.
+
+    The upper half of the quad follows a joint that rotates.
+    """
     posed = []
     for mode in ("OPAQUE", "MASK"):
         file = masked(alphaMode=mode)
@@ -208,7 +210,7 @@ def test_a_mask_on_a_skinned_and_animated_leaf_moves_with_it(tmp_path: Path) -> 
 
 
 def test_thin_stems_keep_their_width(tmp_path: Path) -> None:
-    """Two texels wide, on a slant over an image of 256: nothing of it is lost between larger steps."""
+    """A stem two texels wide runs diagonally over an image of 256 texels. No part of it is lost."""
     y, x = np.mgrid[:256, :256] + 0.5
     stem = leaf(256)
     stem[..., 3] = 255 * (np.abs(y * 0.6 + x * 0.8 - 180) < 1)
@@ -216,7 +218,7 @@ def test_thin_stems_keep_their_width(tmp_path: Path) -> None:
     assert area(mesh) == pytest.approx((stem[..., 3] > 0).mean(), rel=0.05)
 
 
-def test_masks_of_two_materials_are_each_their_own(tmp_path: Path) -> None:
+def test_two_materials_have_separate_masks(tmp_path: Path) -> None:
     file = File()
     small = leaf()
     small[:, :32, 3] = 0
@@ -226,8 +228,8 @@ def test_masks_of_two_materials_are_each_their_own(tmp_path: Path) -> None:
     assert area(half) == pytest.approx(area(whole) / 2, rel=0.03)
 
 
-def test_a_leaf_joined_with_others_keeps_its_mask_where_they_share_it(tmp_path: Path) -> None:
-    """`load_mesh` makes one body of all."""
+def test_leaves_of_one_material_keep_their_mask_in_one_mesh(tmp_path: Path) -> None:
+    """`load_mesh` joins all parts into one mesh."""
     file = File()
     material = material_of(file, leaf())
     file.node(mesh=file.mesh(quad(file, material), quad(file, material, (0.2, 0, 0))))
@@ -235,8 +237,8 @@ def test_a_leaf_joined_with_others_keeps_its_mask_where_they_share_it(tmp_path: 
         assert area(load_mesh(file.save(tmp_path / "leaf.glb")).mesh) == pytest.approx(2 * ELLIPSE, rel=0.02)
 
 
-def test_a_leaf_throws_the_shadow_of_its_outline(tmp_path: Path) -> None:
-    """On a wall behind it, lit from the front: the wall is dark in an ellipse, not in a square."""
+def test_a_leaf_casts_the_shadow_of_its_outline(tmp_path: Path) -> None:
+    """A wall behind the leaf is lit from the front. Its shadow is an ellipse and not a square."""
     file = File()
     white = file.add("materials", name="wall", pbrMetallicRoughness={"metallicFactor": 0})
     wall = file.primitive(
@@ -255,8 +257,8 @@ def test_a_leaf_throws_the_shadow_of_its_outline(tmp_path: Path) -> None:
     assert not dark[:12, :12].any() and dark[32, 32]
 
 
-def test_the_same_leaf_by_vertices_alone(tmp_path: Path) -> None:
-    """A cut leaf looks as a polygon with the leaf's picture on it does."""
+def test_a_masked_leaf_looks_like_a_polygon(tmp_path: Path) -> None:
+    """A masked leaf looks like a polygon with the same outline and texture."""
     cut_out = cut(masked(leaf(256)), tmp_path)
     turns = np.linspace(0, 2 * np.pi, 73)[:-1]
     rim = np.stack([A * np.cos(turns), B * np.sin(turns), 0 * turns], axis=1)

@@ -1,4 +1,4 @@
-"""What glTF files say of materials: colours of vertices, media of their own, and how their surface reflects."""
+"""Materials of glTF files: vertex colours, media, and reflection at the surface."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import ball, ball_primitive, checkered, colored, difference, encoded, loaded, picture, texture, told
+from balls import (
+    ball,
+    ball_primitive,
+    checkered,
+    colored,
+    difference,
+    encoded,
+    loaded,
+    picture,
+    scene_and_notes,
+    texture,
+)
 from gltfs import File
 
 from wgsss.scene import MATERIALS, Scene
@@ -20,7 +31,7 @@ TOPS = {"f4": 1.0, "u1": 255, "u2": 65535}
 
 
 def shades() -> Array:
-    """Linear colours of the ball's vertices: red above, blue below, each a multiple of 1 / 255."""
+    """Return linear colours of the vertices of the ball: red above, blue below, in multiples of 1 / 255."""
     share = ball()[1][:, 1]
     return np.round(np.stack([1 - share, np.full_like(share, 0.2), share, np.ones_like(share)], axis=1) * 255) / 255
 
@@ -37,8 +48,8 @@ def with_colors(kind: str, dtype: str, textured: bool = False) -> File:
 @pytest.mark.parametrize("textured", [False, True])
 @pytest.mark.parametrize("kind", ["VEC3", "VEC4"])
 @pytest.mark.parametrize("dtype", ["u1", "u2"])
-def test_vertex_colours_of_every_type(tmp_path: Path, kind: str, dtype: str, textured: bool) -> None:
-    """As those of floating point. They multiply the texture, and without one are the colour themselves."""
+def test_vertex_colours_of_every_type_agree(tmp_path: Path, kind: str, dtype: str, textured: bool) -> None:
+    """All types agree with floating point. Colours multiply the texture, or are the base colour without one."""
     expected = loaded(with_colors("VEC3", "f4", textured), tmp_path)
     assert difference(loaded(with_colors(kind, dtype, textured), tmp_path), expected) <= 1
     seen = picture(expected)
@@ -47,8 +58,8 @@ def test_vertex_colours_of_every_type(tmp_path: Path, kind: str, dtype: str, tex
     assert difference(expected, loaded(checkered(), tmp_path)) > 50
 
 
-def test_vertex_colours_on_one_of_two_parts(tmp_path: Path) -> None:
-    """The other one is white, and both are one body where they share a material."""
+def test_vertex_colours_may_be_on_one_of_two_parts(tmp_path: Path) -> None:
+    """The part without colours is white. Parts with the same material form one body."""
     file = File()
     colors = file.rows(shades()[:, :3], "VEC3")
     file.node(
@@ -63,11 +74,11 @@ def test_vertex_colours_on_one_of_two_parts(tmp_path: Path) -> None:
     assert np.ptp(seen[26, 44, :3]) < 30 < np.ptp(seen[26, 16, :3])
 
 
-def test_a_material_with_a_colour_of_its_own_is_tinted_by_vertices(tmp_path: Path) -> None:
-    """A measured material's colour gives way to them; one that was asked for multiplies them."""
+def test_vertex_colours_replace_or_tint_the_colour_of_a_material(tmp_path: Path) -> None:
+    """Vertex colours replace the colour of a measured material, and multiply a colour that the user sets."""
     path = with_colors("VEC4", "u1").save(tmp_path / "ball.glb")
-    assert told(path, material="skin")[0].objects[0].material.base_color == (1, 1, 1)
-    asked = told(path, material={"preset": "skin", "base_color": [0.5, 0.6, 0.7]})[0]
+    assert scene_and_notes(path, material="skin")[0].objects[0].material.base_color == (1, 1, 1)
+    asked = scene_and_notes(path, material={"preset": "skin", "base_color": [0.5, 0.6, 0.7]})[0]
     assert asked.objects[0].material.base_color == (0.5, 0.6, 0.7)
 
 
@@ -87,8 +98,11 @@ VOLUME = {"thicknessFactor": 0.1, "attenuationDistance": DISTANCE, "attenuationC
 
 
 def medium(color: Any = COLOR, g: float = 0.0, strength: float = 1.0) -> tuple[Array, Array]:
-    """Coefficients, 1/mm, worked out from the drafts' text: the albedo of one event whose many give a colour
-    (Kulla & Conty), less what goes on forwards."""
+    """Compute the coefficients, 1/mm, from the text of the drafts.
+
+    The single-scattering albedo follows from the colour after many events (Kulla & Conty 2017), and scattering is
+    reduced by the anisotropy.
+    """
     r = np.asarray(color) * strength
     s = 4.09712 + 4.20863 * r - np.sqrt(9.59217 + 41.6808 * r + 17.7126 * r * r)
     albedo = (1 - s * s) / (1 - g * s * s)
@@ -123,9 +137,9 @@ def volumetric(scatter: dict[str, Any] | None, volume: dict[str, Any] | None = N
         ),
     ],
 )
-def test_a_medium_of_the_file(tmp_path: Path, scatter: dict[str, Any], g: float, strength: float) -> None:
-    """In both spellings, of the draft and of its successor."""
-    scene, lines = told(volumetric(scatter, KHR_materials_ior={"ior": 1.4}), tmp_path)
+def test_a_medium_of_the_file_is_used(tmp_path: Path, scatter: dict[str, Any], g: float, strength: float) -> None:
+    """The names of the draft and those of its successor give the same medium."""
+    scene, lines = scene_and_notes(volumetric(scatter, KHR_materials_ior={"ior": 1.4}), tmp_path)
     material = scene.objects[0].material
     sigma_a, sigma_s_prime = medium(COLOR, g, strength)
     assert (material.name, material.eta) == ("wax", 1.4)
@@ -134,27 +148,27 @@ def test_a_medium_of_the_file(tmp_path: Path, scatter: dict[str, Any], g: float,
     assert lines == []
 
 
-def test_a_medium_is_drawn_as_the_same_coefficients_given_by_hand(tmp_path: Path) -> None:
+def test_a_medium_is_drawn_like_a_material_with_its_coefficients(tmp_path: Path) -> None:
     path = volumetric({"multiscatterColor": list(COLOR)}).save(tmp_path / "ball.glb")
     sigma_a, sigma_s_prime = (tuple(float(x) for x in c) for c in medium())
     by_hand = {"sigma_a": list(sigma_a), "sigma_s_prime": list(sigma_s_prime), "eta": 1.5}
-    own, table = told(path)[0], told(path, material=by_hand)[0]
+    own, table = scene_and_notes(path)[0], scene_and_notes(path, material=by_hand)[0]
     assert difference(own, table, "jimenez15") <= 1
-    assert difference(own, told(path, material="marble")[0], "jimenez15") > 10
+    assert difference(own, scene_and_notes(path, material="marble")[0], "jimenez15") > 10
 
 
-def test_a_chosen_material_takes_the_place_of_the_medium(tmp_path: Path) -> None:
-    scene, _ = told(volumetric({"multiscatterColor": list(COLOR)}), tmp_path, material="ketchup")
+def test_a_chosen_material_replaces_the_medium(tmp_path: Path) -> None:
+    scene, _ = scene_and_notes(volumetric({"multiscatterColor": list(COLOR)}), tmp_path, material="ketchup")
     assert scene.objects[0].material.name == "ketchup"
     assert scene.objects[0].material.sigma_a == MATERIALS["ketchup"].sigma_a
 
 
 @pytest.mark.parametrize("size_mm", [10, 1000])
 def test_a_medium_is_scaled_with_its_mesh(tmp_path: Path, size_mm: float) -> None:
-    """Whatever the size, the picture is the same: the file's metre is taken for another length."""
+    """A scale of the mesh does not change the picture, because it also scales the unit of the medium."""
     path = volumetric({"multiscatterColor": list(COLOR)}).save(tmp_path / "ball.glb")
-    scaled, lines = told(path, size_mm=size_mm)
-    ratio = size_mm / np.ptp(told(path)[0].bounds, axis=0).max()
+    scaled, lines = scene_and_notes(path, size_mm=size_mm)
+    ratio = size_mm / np.ptp(scene_and_notes(path)[0].bounds, axis=0).max()
     assert np.multiply(scaled.objects[0].material.sigma_a, ratio) == pytest.approx(medium()[0], rel=1e-4)
     assert lines == []
 
@@ -170,18 +184,18 @@ def test_a_medium_is_scaled_with_its_mesh(tmp_path: Path, size_mm: float) -> Non
         ({"strength": 1, "scatterStrengthFactor": 1}, {**VOLUME, "thicknessFactor": 0}, "walls are thin"),
     ],
 )
-def test_a_medium_in_which_nothing_scatters_is_said(
+def test_a_medium_without_scattering_is_noted(
     tmp_path: Path, scatter: dict[str, Any] | None, volume: dict[str, Any] | None, words: str
 ) -> None:
-    scene, lines = told(volumetric(scatter, volume), tmp_path)
+    scene, lines = scene_and_notes(volumetric(scatter, volume), tmp_path)
     assert scene.objects[0].material.name == "marble"
     assert len(lines) == 1 and words in lines[0]
 
 
-def test_scattering_without_a_volume_is_said(tmp_path: Path) -> None:
+def test_scattering_without_a_volume_is_noted(tmp_path: Path) -> None:
     file = checkered()
     file.tree["materials"][0]["extensions"] = {"KHR_materials_volume_scatter": {"multiscatterColor": list(COLOR)}}
-    _, lines = told(file, tmp_path)
+    _, lines = scene_and_notes(file, tmp_path)
     assert len(lines) == 1 and "KHR_materials_volume_scatter" in lines[0] and "KHR_materials_volume" in lines[0]
 
 
@@ -191,18 +205,18 @@ def test_scattering_without_a_volume_is_said(tmp_path: Path) -> None:
 def surfaced(tmp_path: Path, **extensions: Any) -> tuple[Scene, list[str]]:
     file = checkered()
     file.tree["materials"][0]["extensions"] = extensions
-    return told(file, tmp_path)
+    return scene_and_notes(file, tmp_path)
 
 
 @pytest.mark.parametrize(("ior", "eta"), [(1.0, 1.0), (1.33, 1.33), (2.42, 2.42)])
-def test_the_index_of_refraction_of_the_file(tmp_path: Path, ior: float, eta: float) -> None:
+def test_the_index_of_refraction_of_the_file_is_used(tmp_path: Path, ior: float, eta: float) -> None:
     scene, lines = surfaced(tmp_path, KHR_materials_ior={"ior": ior})
     assert scene.objects[0].material.eta == eta and lines == []
 
 
 @pytest.mark.parametrize("ior", [0, 0.9, 40])
-def test_an_index_of_refraction_that_cannot_be_is_said(tmp_path: Path, ior: float) -> None:
-    """0 stands for infinity, in the words of KHR_materials_ior."""
+def test_an_invalid_index_of_refraction_is_noted(tmp_path: Path, ior: float) -> None:
+    """KHR_materials_ior defines 0 as infinity."""
     scene, lines = surfaced(tmp_path, KHR_materials_ior={"ior": ior})
     assert len(lines) == 1 and f"refraction of {ior:g}" in lines[0]
     assert scene.objects[0].material.eta == MATERIALS["marble"].eta
@@ -216,19 +230,19 @@ def test_an_index_of_refraction_of_one_reflects_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.3, 1.0])
-def test_the_specular_factor_of_the_file(tmp_path: Path, factor: float) -> None:
+def test_the_specular_factor_of_the_file_is_used(tmp_path: Path, factor: float) -> None:
     scene, lines = surfaced(tmp_path, KHR_materials_specular={"specularFactor": factor})
     assert scene.objects[0].material.specular == factor and lines == []
 
 
 @pytest.mark.parametrize(("roughness", "expected"), [(0.0, 0.02), (0.4, 0.4), (1, 1.0)])
-def test_the_roughness_of_the_file(tmp_path: Path, roughness: float, expected: float) -> None:
+def test_the_roughness_of_the_file_is_used(tmp_path: Path, roughness: float, expected: float) -> None:
     file = checkered()
     file.tree["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] = roughness
     assert loaded(file, tmp_path).objects[0].material.roughness == pytest.approx(expected)
 
 
-def test_a_specular_texture_is_its_alpha(tmp_path: Path) -> None:
+def test_a_specular_texture_uses_alpha(tmp_path: Path) -> None:
     file = checkered()
     image = np.zeros((2, 2, 4), np.uint8)
     image[..., 3] = 77

@@ -1,4 +1,4 @@
-"""Animations of glTF files: which one plays, what is hidden for a while, and how rotations are stored."""
+"""Animations of glTF files: choice by name, hidden parts, and storage of rotations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import ball, ball_primitive, checkered, colored, difference, encoded, loaded, picture, texture, told
+from balls import (
+    ball,
+    ball_primitive,
+    checkered,
+    colored,
+    difference,
+    encoded,
+    loaded,
+    picture,
+    scene_and_notes,
+    texture,
+)
 from gltfs import File
 
 from wgsss.errors import InputError
@@ -19,19 +30,19 @@ SHOWN = [(1, 1, 1), (0, 0, 0), (1, 1, 1)]
 
 
 def animate(file: File, *channels: tuple[int, str, Any, Any], kind: str = "LINEAR", **fields: Any) -> File:
-    """The file with one more animation, of channels (node, path, times, values)."""
-    samplers, found = [], []
+    """Add an animation of channels (node, path, times, values) to a file, and return the file."""
+    samplers, targets = [], []
     for node, path, times, values in channels:
         shape = {"weights": "SCALAR", "rotation": "VEC4"}.get(path, "VEC3")
         ends = {"input": file.rows(times, "SCALAR"), "output": file.rows(values, shape)}
-        found.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        targets.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         samplers.append({**ends, "interpolation": kind})
-    file.add("animations", channels=found, samplers=samplers, **fields)
+    file.add("animations", channels=targets, samplers=samplers, **fields)
     return file
 
 
 def two_balls() -> File:
-    """One at the origin, and one of another material to its right."""
+    """Make a file with a ball at the origin, and a ball of another material to its right."""
     file = File()
     file.node(mesh=file.mesh(ball_primitive(file, colored(file))))
     other = texture(file, encoded(np.full((2, 2, 3), (20, 160, 40), np.uint8)))
@@ -41,7 +52,7 @@ def two_balls() -> File:
 
 
 def seen(scene: Scene, time_s: float) -> tuple[bool, bool]:
-    """Whether anything is seen in the left and in the right half of a picture."""
+    """Return whether the left and the right half of a picture show something."""
     alpha = picture(scene, time=time_s)[..., 3]
     return bool(alpha[:, :28].any()), bool(alpha[:, 36:].any())
 
@@ -50,8 +61,8 @@ def seen(scene: Scene, time_s: float) -> tuple[bool, bool]:
 
 
 @pytest.mark.parametrize("method", ["lambert", "deon07", "jimenez15", "sam"])
-def test_a_mesh_that_is_scaled_to_nothing_is_not_drawn_then(tmp_path: Path, method: str) -> None:
-    """By STEP, the usual way to hide; at other times it is as without the animation."""
+def test_a_mesh_scaled_to_nothing_is_not_drawn(tmp_path: Path, method: str) -> None:
+    """STEP interpolation of the scale is the usual way to hide a mesh. At other times, the mesh is unchanged."""
     file = animate(checkered(), (0, "scale", [0, 0.5, 1], SHOWN), kind="STEP")
     scene, still = loaded(file, tmp_path, size_mm=22), loaded(checkered(), tmp_path, size_mm=22)
     knobs: dict[str, Any] = {"deon07": {"map_size": 64}, "sam": {"surface": "screen"}}.get(method, {})
@@ -61,12 +72,12 @@ def test_a_mesh_that_is_scaled_to_nothing_is_not_drawn_then(tmp_path: Path, meth
     assert not hidden[..., 3].any() and not hidden[..., :3].any()
 
 
-def test_one_of_two_parts_hides(tmp_path: Path) -> None:
+def test_one_of_two_parts_is_hidden(tmp_path: Path) -> None:
     scene = loaded(animate(two_balls(), (1, "scale", [0, 0.5, 1], SHOWN), kind="STEP"), tmp_path)
     assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (True, False)]
 
 
-def test_one_of_two_parts_of_one_body_hides(tmp_path: Path) -> None:
+def test_one_of_two_parts_of_a_body_is_hidden(tmp_path: Path) -> None:
     file, material = File(), None
     for shift in (0.0, 0.15):
         file.node(mesh=file.mesh(ball_primitive(file, material)), translation=[shift, 0, 0])
@@ -75,14 +86,14 @@ def test_one_of_two_parts_of_one_body_hides(tmp_path: Path) -> None:
     assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (True, False)]
 
 
-def test_both_parts_hide(tmp_path: Path) -> None:
+def test_both_parts_are_hidden(tmp_path: Path) -> None:
     file = animate(two_balls(), *((n, "scale", [0, 0.5, 1], SHOWN) for n in (0, 1)), kind="STEP")
     scene = loaded(file, tmp_path)
     assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, True), (False, False)]
 
 
-def test_a_scale_through_nothing(tmp_path: Path) -> None:
-    """LINEAR from 1 to -1: small about the middle, nothing at it, and turned inside out after it."""
+def test_a_scale_passes_through_zero(tmp_path: Path) -> None:
+    """The scale goes from 1 to -1. The mesh is invisible in the middle, and mirrored after it."""
     file = animate(checkered(), (0, "scale", [0, 1], [(1, 1, 1), (-1, -1, -1)]))
     scene = loaded(file, tmp_path)
     counts = [int((picture(scene, time=time_s)[..., 3] > 0).sum()) for time_s in (0.0, 0.4, 0.5, 0.6, 0.999)]
@@ -91,8 +102,8 @@ def test_a_scale_through_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("joined", [False, True])
-def test_a_part_that_is_hidden_at_rest_shows_later(tmp_path: Path, joined: bool) -> None:
-    """Its node is scaled to 0, and the animation scales it up."""
+def test_a_part_hidden_at_rest_appears_later(tmp_path: Path, joined: bool) -> None:
+    """The scale of the node is 0 at rest, and the animation enlarges it."""
     file = two_balls()
     if joined:
         primitives = [mesh["primitives"][0] for mesh in file.tree["meshes"]]
@@ -100,19 +111,19 @@ def test_a_part_that_is_hidden_at_rest_shows_later(tmp_path: Path, joined: bool)
     file.tree["nodes"][1]["scale"] = [0, 0, 0]
     animate(file, (1, "scale", [0, 0.5, 1], [(0, 0, 0), (1, 1, 1), (1, 1, 1)]), kind="STEP")
     path = file.save(tmp_path / "balls.glb")
-    scene, lines = told(path)
+    scene, lines = scene_and_notes(path)
     assert lines == []
     assert [seen(scene, time_s) for time_s in (0.0, 0.7)] == [(True, False), (True, True)]
-    still, lines = told(path, animation="none")
+    still, lines = scene_and_notes(path, animation="none")
     assert len(still.objects) == 1 and seen(still, 0.0)[0] and still.bounds[1, 0] < 51
     assert len(lines) == 1 and ("degenerate" in lines[0] or "no area" in lines[0])
 
 
-def test_all_that_is_hidden_at_rest_shows_later(tmp_path: Path) -> None:
+def test_all_parts_hidden_at_rest_appear_later(tmp_path: Path) -> None:
     file = checkered(node={"scale": [0, 0, 0]})
     animate(file, (0, "scale", [0, 1], [(0, 0, 0), (1, 1, 1)]))
     path = file.save(tmp_path / "ball.glb")
-    scene, _ = told(path)
+    scene, _ = scene_and_notes(path)
     assert not picture(scene)[..., 3].any() and picture(scene, time=0.99)[..., 3].any()
     with pytest.raises(InputError, match="zero size"):
         load_scene(path, animation="none")
@@ -122,13 +133,13 @@ def test_all_that_is_hidden_at_rest_shows_later(tmp_path: Path) -> None:
 
 
 def shift(path: Path, **options: Any) -> list[float]:
-    """How far the ball is moved in a second, mm."""
-    scene = told(path, **options)[0]
+    """Return the distance, mm, by which the ball moves in a second."""
+    scene = scene_and_notes(path, **options)[0]
     return np.round(scene.at(0.5).bounds.mean(axis=0) - scene.bounds.mean(axis=0), 1).tolist()
 
 
 def walks(*names: str | None) -> File:
-    """The ball with animations that move it by 100 mm, 200 mm and so on along x in a second."""
+    """Make a ball with animations that move it by 100 mm, 200 mm and so on along x in a second."""
     file = checkered()
     for number, name in enumerate(names, start=1):
         fields = {} if name is None else {"name": name}
@@ -136,7 +147,7 @@ def walks(*names: str | None) -> File:
     return file
 
 
-def test_an_animation_by_its_name_and_by_its_number(tmp_path: Path) -> None:
+def test_an_animation_is_chosen_by_name_or_number(tmp_path: Path) -> None:
     path = walks("Walk", "Run", "").save(tmp_path / "ball.glb")
     assert shift(path) == [100, 0, 0] == shift(path, animation="Walk") == shift(path, animation="0")
     assert shift(path, animation="Run") == [200, 0, 0] == shift(path, animation="1")
@@ -148,18 +159,20 @@ def test_an_animation_by_its_name_and_by_its_number(tmp_path: Path) -> None:
         load_scene(path, animation="3")
 
 
-def test_those_that_do_not_play_are_said(tmp_path: Path) -> None:
+def test_animations_that_do_not_play_are_noted(tmp_path: Path) -> None:
     path = walks("Walk", "Run", "").save(tmp_path / "ball.glb")
-    assert told(path)[1] == ["plays Walk, the first of 3 animations (--animation NAME plays another: Run, 2)"]
-    assert told(path, animation="Walk")[1] == told(path, animation="none")[1] == []
-    assert told(walks("Walk"), tmp_path)[1] == []
+    assert scene_and_notes(path)[1] == [
+        "plays Walk, the first of 3 animations (--animation NAME plays another: Run, 2)"
+    ]
+    assert scene_and_notes(path, animation="Walk")[1] == scene_and_notes(path, animation="none")[1] == []
+    assert scene_and_notes(walks("Walk"), tmp_path)[1] == []
 
 
-def test_animations_of_one_name_are_told_apart_by_their_numbers(tmp_path: Path) -> None:
+def test_animations_with_one_name_get_numbers(tmp_path: Path) -> None:
     path = walks("Walk", "Walk", "none", "", "3").save(tmp_path / "ball.glb")
     assert shift(path, animation="Walk") == [100, 0, 0]
     assert shift(path, animation="1") == [200, 0, 0]
-    assert shift(path, animation="2") == [300, 0, 0], "'none' stands for no animation"
+    assert shift(path, animation="2") == [300, 0, 0], "'none' means no animation"
     assert sorted(shift(path, animation=name)[0] for name in ("3", "4")) == [400, 500]
 
 
@@ -168,19 +181,19 @@ def test_channels_that_move_nothing_are_counted(tmp_path: Path) -> None:
     lamp = file.node()
     lift = [(0, 0, 0), (0, 1, 0)]
     animate(file, (0, "translation", [0, 1], lift), (lamp, "translation", [0, 1], lift), name="A")
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert scene.objects[0].motion is not None
     assert lines == ["animation A: 1 channel moves nothing that is drawn"]
 
 
-def test_parts_begin_anew_together_and_still_ones_do_not_move(tmp_path: Path) -> None:
-    """A period is that of the whole animation, even if the longest channel moves nothing that is drawn."""
+def test_parts_repeat_together_and_still_parts_do_not_move(tmp_path: Path) -> None:
+    """The period is that of the whole animation, even if its longest channel moves nothing."""
     file = two_balls()
     file.node(mesh=file.mesh(ball_primitive(file)), translation=[0.3, 0, 0])
     lamp = file.node()
     lift = [(0, 0, 0), (0, 0.1, 0)]
     channels = [(n, "translation", [0, end], lift) for n, end in ((0, 1), (1, 2), (lamp, 5))]
-    objects = told(animate(file, *channels), tmp_path)[0].objects
+    objects = scene_and_notes(animate(file, *channels), tmp_path)[0].objects
     assert [o.motion and o.motion.period_s for o in objects] == [5, 5, None]
     tops = [[float(o.at(time_s).placed[:, 1].max()) for o in objects] for time_s in (2.5, 5.5)]
     assert tops[0][:2] == pytest.approx([150, 150], abs=1) and tops[1][:2] == pytest.approx([100, 75], abs=1)
@@ -190,7 +203,7 @@ def test_parts_begin_anew_together_and_still_ones_do_not_move(tmp_path: Path) ->
 
 
 def turned(dtype: str, kind: str = "LINEAR") -> File:
-    """The ball turned by a quarter about z in a second, and held."""
+    """Make a ball that rotates by a quarter turn about z in a second, and then stops."""
     file = checkered()
     keys = np.array([(0, 0, 0, 1), (0, 0, HALF, HALF), (0, 0, HALF, HALF)])
     tops = {"i1": 127, "i2": 32767}
@@ -201,7 +214,7 @@ def turned(dtype: str, kind: str = "LINEAR") -> File:
 
 
 @pytest.mark.parametrize(("dtype", "near"), [("i1", 1.0), ("i2", 0.01)])
-def test_rotations_of_whole_numbers(tmp_path: Path, dtype: str, near: float) -> None:
+def test_rotations_stored_as_integers(tmp_path: Path, dtype: str, near: float) -> None:
     whole, plain = loaded(turned(dtype), tmp_path), loaded(turned("f4"), tmp_path)
     for time_s in (0.0, 0.5, 1.5):
         a, b = (scene.at(time_s).objects[0].mesh.positions for scene in (whole, plain))
@@ -210,8 +223,8 @@ def test_rotations_of_whole_numbers(tmp_path: Path, dtype: str, near: float) -> 
     assert plain.at(1.5).objects[0].mesh.positions[top] == pytest.approx((-50, 0, 0), abs=1e-3)
 
 
-def test_a_skin_and_a_morph_in_one(tmp_path: Path) -> None:
-    """The target moves the ball up by 100 mm in the mesh's space, then its joint turns that to the left."""
+def test_a_skin_and_a_morph_target_together(tmp_path: Path) -> None:
+    """The morph target moves the ball up by 100 mm, and the joint rotates this offset to the left."""
     file = checkered()
     count = len(ball()[0])
     primitive = file.tree["meshes"][0]["primitives"][0]
@@ -232,7 +245,7 @@ def test_a_skin_and_a_morph_in_one(tmp_path: Path) -> None:
 
 
 def test_a_cubic_spline_overshoots(tmp_path: Path) -> None:
-    """In and out tangents as the file gives them: x(t) is 4 t (1 - t), of which both keys are 0."""
+    """The tangents of the file give x(t) = 4 t (1 - t), which is 0 at both keys."""
     file = checkered()
     rows = [(0, 0, 0), (0, 0, 0), (0.4, 0, 0), (-0.4, 0, 0), (0, 0, 0), (0, 0, 0)]
     animate(file, (0, "translation", [0, 1], rows), kind="CUBICSPLINE")

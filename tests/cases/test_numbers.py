@@ -1,4 +1,4 @@
-"""Numbers of glTF files stored in every way: normalised, quantised, strided and sparse. All give the same picture."""
+"""Numbers of glTF files in every storage (normalised, quantised, strided, sparse) give the same picture."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ TOPS = {"i1": 127, "u1": 255, "i2": 32767, "u2": 65535}
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """A ball with a checker, all of whose numbers are of floating point."""
+    """Load a ball with a checker whose numbers are all floating-point."""
     return loaded(checkered(), tmp_path_factory.mktemp("plain"))
 
 
-def with_attributes(**made: Any) -> File:
-    """A ball with a checker, some of whose attributes are made by functions of its file."""
+def with_attributes(**makers: Any) -> File:
+    """Make a ball with a checker. Each of `makers` is a function that adds an attribute to the file."""
     file = File()
-    attributes = {name: make(file) for name, make in made.items()}
+    attributes = {name: make(file) for name, make in makers.items()}
     file.node(mesh=file.mesh(ball_primitive(file, colored(file), attributes=attributes)))
     return file
 
@@ -35,7 +35,7 @@ def whole(values: Array, dtype: str) -> Array:
 
 
 def interleaved(file: File, columns: dict[str, tuple[Array, str, str, bool]], padding: int = 0) -> dict[str, int]:
-    """Accessors of one buffer view: rows of (values, kind, dtype, normalised) by name, padded to multiples of 4."""
+    """Add accessors with one buffer view: columns of (values, kind, dtype, normalised), padded to 4 bytes."""
     fields: list[Any] = []
     for name, (values, _, dtype, _) in columns.items():
         fields += [(name, f"<{dtype}", values.shape[1]), (f"{name} padding", "u1", -values.itemsize % 4)]
@@ -45,9 +45,9 @@ def interleaved(file: File, columns: dict[str, tuple[Array, str, str, bool]], pa
     for name, (values, *_) in columns.items():
         rows[name] = values
     view = file.view(rows.tobytes(), byteStride=rows.itemsize)
-    found = {}
+    accessors = {}
     for name, (values, kind, dtype, normalized) in columns.items():
-        found[name] = file.add(
+        accessors[name] = file.add(
             "accessors",
             bufferView=view,
             byteOffset=rows.dtype.fields[name][1],
@@ -56,13 +56,13 @@ def interleaved(file: File, columns: dict[str, tuple[Array, str, str, bool]], pa
             count=len(values),
             normalized=normalized,
         )
-    return found
+    return accessors
 
 
 def sparse(
     file: File, kind: str, index: Array, values: Array, *, indices: str = "u2", dtype: str = "f4", **base: Any
 ) -> int:
-    """An accessor some of whose rows are others than those of a buffer view, or than zero."""
+    """Add an accessor that replaces some rows of a buffer view, or of zeros."""
     patch = {
         "count": len(index),
         "indices": {"bufferView": file.view(index, indices), "componentType": CODES[indices]},
@@ -75,15 +75,15 @@ def sparse(
 
 
 @pytest.mark.parametrize("dtype", ["u1", "u2"])
-def test_normalised_texture_coordinates(tmp_path: Path, plain: Scene, dtype: str) -> None:
-    """Core glTF 2.0: no extension is needed."""
+def test_texture_coordinates_may_be_normalised(tmp_path: Path, plain: Scene, dtype: str) -> None:
+    """Core glTF 2.0 allows this without an extension."""
     file = with_attributes(TEXCOORD_0=lambda f: f.rows(whole(ball()[1], dtype), "VEC2", dtype, normalized=True))
     assert difference(loaded(file, tmp_path), plain) <= 1
 
 
 @pytest.mark.parametrize("dtype", ["i2", "u2"])
-def test_normalised_positions(tmp_path: Path, plain: Scene, dtype: str) -> None:
-    """As KHR_mesh_quantization allows: whole numbers for 0 to 1, or -1 to 1, which a node scales and moves."""
+def test_positions_may_be_normalised(tmp_path: Path, plain: Scene, dtype: str) -> None:
+    """KHR_mesh_quantization allows integers for 0 to 1 or -1 to 1. A node scales and translates them."""
     low, span = (-RADIUS, 2 * RADIUS) if dtype == "u2" else (0.0, RADIUS)
     stored = whole((ball()[0] - low) / span, dtype)
     file = with_attributes(POSITION=lambda f: f.rows(stored, "VEC3", dtype, normalized=True))
@@ -94,14 +94,14 @@ def test_normalised_positions(tmp_path: Path, plain: Scene, dtype: str) -> None:
     assert differing(scene, plain) < 0.01
 
 
-def test_quantised_positions_that_are_not_normalised(tmp_path: Path, plain: Scene) -> None:
+def test_quantised_positions_need_not_be_normalised(tmp_path: Path, plain: Scene) -> None:
     file = with_attributes(POSITION=lambda f: f.rows(np.round(ball()[0] / RADIUS * 16383), "VEC3", "i2"))
     file.tree["nodes"][0]["scale"] = [RADIUS / 16383] * 3
     assert differing(loaded(file, tmp_path), plain) < 0.01
 
 
 def test_quantised_coordinates_with_a_texture_transform(tmp_path: Path, plain: Scene) -> None:
-    """What gltfpack writes: whole numbers, and the texture's transform that scales them to 0 to 1."""
+    """gltfpack writes integers, and a texture transform that scales them to 0 to 1."""
     file = File()
     scale = {"KHR_texture_transform": {"scale": [1 / 65535, 1 / 65535]}}
     uvs = file.rows(whole(ball()[1], "u2"), "VEC2", "u2")
@@ -112,7 +112,7 @@ def test_quantised_coordinates_with_a_texture_transform(tmp_path: Path, plain: S
 
 @pytest.mark.parametrize("padding", [0, 4, 20])
 def test_interleaved_attributes(tmp_path: Path, plain: Scene, padding: int) -> None:
-    """Positions, normals and coordinates in the rows of one buffer view, of several types and with gaps."""
+    """Positions, normals and coordinates of several types share the rows of one buffer view, with gaps."""
     points, uvs, _ = ball()
     file = File()
     columns = {
@@ -126,8 +126,8 @@ def test_interleaved_attributes(tmp_path: Path, plain: Scene, padding: int) -> N
     assert differing(loaded(file, tmp_path), plain) < 0.01
 
 
-def test_views_and_accessors_that_begin_elsewhere(tmp_path: Path, plain: Scene) -> None:
-    """All offsets at once: of the view in its buffer, of the accessor in its view, and of a second buffer."""
+def test_offsets_of_views_and_accessors(tmp_path: Path, plain: Scene) -> None:
+    """The file has offsets of a view in its buffer and of an accessor in its view, and a second buffer."""
     points, _, faces = ball()
     file = with_attributes()
     data = np.concatenate([[7.0] * 5, np.ravel(points)]).astype("<f4").tobytes()
@@ -147,7 +147,7 @@ def test_views_and_accessors_that_begin_elsewhere(tmp_path: Path, plain: Scene) 
 
 
 def bump() -> tuple[Array, Array]:
-    """Of the ball, the vertices near its top, and where they stand 100 mm further out."""
+    """Return the vertices near the top of the ball, and their positions 100 mm further out."""
     points = ball()[0]
     index = np.flatnonzero(points[:, 1] > 0.6 * RADIUS)
     return index, points[index] * 3
@@ -160,12 +160,12 @@ def test_sparse_positions(tmp_path: Path, indices: str) -> None:
     dense = points.copy()
     dense[index] = moved
 
-    def made(file: File) -> int:
+    def maker(file: File) -> int:
         return sparse(
             file, "VEC3", index, moved, indices=indices, bufferView=file.view(points, "f4"), count=len(points)
         )
 
-    scene = loaded(with_attributes(POSITION=made), tmp_path)
+    scene = loaded(with_attributes(POSITION=maker), tmp_path)
     assert scene.bounds[1, 1] == pytest.approx(150) and np.ptp(scene.bounds, axis=0)[1] == pytest.approx(200)
     same = loaded(with_attributes(POSITION=lambda f: f.rows(dense, "VEC3")), tmp_path)
     assert difference(scene, same) == 0
@@ -183,13 +183,13 @@ def test_sparse_positions_of_whole_numbers(tmp_path: Path, plain: Scene) -> None
     base = stored.copy()
     base[index] = 0
 
-    def made(file: File) -> int:
+    def maker(file: File) -> int:
         padded = np.zeros((len(base), 4))
         padded[:, :3] = base
         view = file.view(padded, "i2", byteStride=8)
         return sparse(file, "VEC3", index, stored[index], dtype="i2", bufferView=view, count=len(base), normalized=True)
 
-    file = with_attributes(POSITION=made)
+    file = with_attributes(POSITION=maker)
     file.tree["nodes"][0]["scale"] = [RADIUS] * 3
     assert differing(loaded(file, tmp_path), plain) < 0.01
 
@@ -200,14 +200,14 @@ def test_sparse_texture_coordinates(tmp_path: Path, plain: Scene) -> None:
     base = uvs.copy()
     base[index] = 0
 
-    def made(file: File) -> int:
+    def maker(file: File) -> int:
         return sparse(file, "VEC2", index, uvs[index], bufferView=file.view(base, "f4"), count=len(uvs))
 
-    assert difference(loaded(with_attributes(TEXCOORD_0=made), tmp_path), plain) == 0
+    assert difference(loaded(with_attributes(TEXCOORD_0=maker), tmp_path), plain) == 0
 
 
-def test_sparse_indices_of_faces(tmp_path: Path, plain: Scene) -> None:
-    """Even the accessor of the triangles may be sparse."""
+def test_indices_of_faces_may_be_sparse(tmp_path: Path, plain: Scene) -> None:
+    """The accessor of the triangles is sparse."""
     corners = np.ravel(ball()[2])
     index = np.arange(30, 60)
     base = corners.copy()
@@ -220,7 +220,7 @@ def test_sparse_indices_of_faces(tmp_path: Path, plain: Scene) -> None:
     assert difference(loaded(file, tmp_path), plain) == 0
 
 
-def test_sparse_positions_play(tmp_path: Path) -> None:
+def test_sparse_positions_are_animated(tmp_path: Path) -> None:
     points = ball()[0]
     index, moved = bump()
     file = with_attributes(
@@ -233,7 +233,7 @@ def test_sparse_positions_play(tmp_path: Path) -> None:
     scene = loaded(file, tmp_path)
     assert scene.bounds[1, 1] == pytest.approx(150)
     turned = scene.at(1.0)
-    assert turned.bounds[0, 0] == pytest.approx(-150), "what pointed up points to the left"
+    assert turned.bounds[0, 0] == pytest.approx(-150), "the direction up has become left"
     assert turned.bounds[1, 1] == pytest.approx(scene.bounds[1, 0])
 
 
@@ -253,14 +253,14 @@ def test_sparse_morph_targets(tmp_path: Path) -> None:
     assert loaded(file, tmp_path).bounds[1, 1] == pytest.approx(150), "a node's own weights take precedence"
 
 
-def test_a_file_that_begins_with_a_byte_order_mark(tmp_path: Path, plain: Scene) -> None:
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path, plain: Scene) -> None:
     path = checkered().save(tmp_path / "ball.gltf")
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     assert difference(load_scene(path), plain) == 0
 
 
-def test_draco_is_decoded_or_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the library that decodes it, one line names the extension and what to install."""
+def test_draco_is_decoded_or_the_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the package that decodes Draco, the error names the extension and the package."""
     import importlib.util
 
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
@@ -278,7 +278,7 @@ def test_draco_is_decoded_or_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_plain_ball_shows_its_checker(plain: Scene) -> None:
-    """What all others are compared with is right itself: eight squares around, about four of them seen."""
+    """The picture that all others are compared with shows about four of the eight squares around the ball."""
     seen = picture(plain, size=96)
     row = seen[48]
     reds = row[row[:, 3] > 0, 0] > row[row[:, 3] > 0, 2]

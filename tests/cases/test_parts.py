@@ -1,4 +1,4 @@
-"""Primitives, nodes and instances of glTF files: all that a file shows is drawn, where it stands, once."""
+"""Primitives, nodes and instances of glTF files: all are drawn once and at the right place."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from balls import (
     encoded,
     loaded,
     picture,
-    told,
+    scene_and_notes,
 )
 from gltfs import File
 
@@ -46,8 +46,8 @@ def volume(mesh: Mesh) -> float:
 
 
 @pytest.mark.parametrize("indexed", [False, True])
-def test_a_fan_beside_triangles_is_drawn(tmp_path: Path, indexed: bool) -> None:
-    """A disc of 14 vertices, 100 mm wide, to the right of a ball."""
+def test_a_fan_and_triangles_are_drawn(tmp_path: Path, indexed: bool) -> None:
+    """A disc of 14 vertices, 100 mm wide, is to the right of a ball."""
     turns = np.linspace(0, 2 * np.pi, 13)
     rim = np.stack([0.1 + RADIUS * np.cos(turns), RADIUS * np.sin(turns), 0 * turns], axis=1)
     disc = np.concatenate([[(0.1, 0, 0)], rim[:-1], rim[:1]])
@@ -55,17 +55,17 @@ def test_a_fan_beside_triangles_is_drawn(tmp_path: Path, indexed: bool) -> None:
     order = np.arange(14)
     fan = file.primitive(disc[::-1], 13 - order, mode=6) if indexed else file.primitive(disc, None, mode=6)
     file.node(mesh=file.mesh(ball_primitive(file), fan))
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert scene.bounds[1, 0] == pytest.approx(150)
     whole, disc_mesh = (o.mesh for o in scene.objects)
-    assert whole.corner_uvs is not None and disc_mesh.corner_uvs is None, "neither takes part of what the other has"
+    assert whole.corner_uvs is not None and disc_mesh.corner_uvs is None, "the two parts do not share vertices"
     assert disc_mesh.area == pytest.approx(12 * 0.5 * 50**2 * math.sin(np.pi / 6), rel=1e-5)
-    assert (disc_mesh.face_normals[:, 2] > 0).all(), "its front is where the order of its corners says"
+    assert (disc_mesh.face_normals[:, 2] > 0).all(), "the winding defines the front of the disc"
     assert lines == ["12 boundary edges (1 hole)"]
 
 
-def test_a_ball_of_strips(tmp_path: Path) -> None:
-    """The rows of the ball as one strip, stitched by triangles without an area."""
+def test_a_ball_may_be_a_triangle_strip(tmp_path: Path) -> None:
+    """The rows of the ball form one strip, joined by triangles without area."""
     columns, rows = 17, 15
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     turn, fall = 2 * np.pi * u, np.pi * v
@@ -86,7 +86,7 @@ def test_a_ball_of_strips(tmp_path: Path) -> None:
         attributes = {"TEXCOORD_0": file.rows(np.stack([u, v], axis=-1).reshape(-1, 2), "VEC2")}
         look = {"material": colored(file), "attributes": attributes}
         file.node(mesh=file.mesh(file.primitive(points.reshape(-1, 3), indices, mode=mode, **look)))
-        scene, _ = told(file, tmp_path)
+        scene, _ = scene_and_notes(file, tmp_path)
         mesh = scene.objects[0].mesh
         assert is_closed(mesh)
         assert volume(mesh) == pytest.approx(4 / 3 * np.pi * 50**3, rel=0.05)
@@ -94,12 +94,12 @@ def test_a_ball_of_strips(tmp_path: Path) -> None:
     assert difference(*pictures) == 0
 
 
-def test_lines_and_points_are_said(tmp_path: Path) -> None:
+def test_lines_and_points_are_noted(tmp_path: Path) -> None:
     file = checkered()
     points = file.tree["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
     for mode in (0, 1, 3):
         file.tree["meshes"][0]["primitives"].append({"attributes": {"POSITION": points}, "mode": mode})
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert len(lines) == 2 and any("points" in line for line in lines) and any("lines" in line for line in lines)
     assert difference(scene, loaded(checkered(), tmp_path)) == 0
 
@@ -108,28 +108,28 @@ def test_lines_and_points_are_said(tmp_path: Path) -> None:
 
 
 def halves(file: File, upper: int | None, lower: int | None) -> list[dict[str, Any]]:
-    """The ball as two primitives that meet at a row of vertices."""
+    """Make the ball as two primitives that meet at a row of vertices."""
     points, uvs, faces = ball()
     above = points[faces].mean(axis=1)[:, 1] > 0
-    found = []
+    primitives = []
     for material, chosen in ((upper, above), (lower, ~above)):
         attributes = {"TEXCOORD_0": file.rows(uvs, "VEC2")}
         more = {} if material is None else {"material": material}
-        found.append(file.primitive(points, faces[chosen], attributes=attributes, **more))
-    return found
+        primitives.append(file.primitive(points, faces[chosen], attributes=attributes, **more))
+    return primitives
 
 
 def test_primitives_of_one_material_are_one_closed_body(tmp_path: Path) -> None:
     file = File()
     material = colored(file)
     file.node(mesh=file.mesh(*halves(file, material, material)))
-    scene, _ = told(file, tmp_path)
+    scene, _ = scene_and_notes(file, tmp_path)
     assert len(scene.objects) == 1 and is_closed(scene.objects[0].mesh)
     assert difference(scene, loaded(checkered(), tmp_path)) <= 1
 
 
-def test_materials_of_other_names_that_look_alike_are_one_body(tmp_path: Path) -> None:
-    """Writers that copy a material for each primitive do not cut a body in two."""
+def test_equal_materials_with_different_names_are_one_body(tmp_path: Path) -> None:
+    """Some programs write a copy of the material for each primitive. This does not split a body."""
     file = File()
     materials = [
         file.add(
@@ -138,19 +138,19 @@ def test_materials_of_other_names_that_look_alike_are_one_body(tmp_path: Path) -
         for name in ("skin", "skin.001")
     ]
     file.node(mesh=file.mesh(*halves(file, *materials)))
-    scene, _ = told(file, tmp_path)
+    scene, _ = scene_and_notes(file, tmp_path)
     assert len(scene.objects) == 1 and is_closed(scene.objects[0].mesh)
 
 
 def solid(file: File, color: Any, name: str) -> int:
-    """A material with a texture of one colour."""
+    """Add a material with a texture of one colour."""
     image = file.add("images", bufferView=file.view(encoded(np.full((2, 2, 3), color, np.uint8))), mimeType="image/png")
     base = {"baseColorTexture": {"index": file.add("textures", source=image)}, "metallicFactor": 0}
     return file.add("materials", name=name, pbrMetallicRoughness=base)
 
 
 def head(path: Path) -> Path:
-    """A file of a red head, a blue eye on it and a green tooth, side by side along x."""
+    """Make a file of three balls along x: a red head, a blue eye and a green tooth."""
     file = File()
     for number, (name, color) in enumerate((("head", RED), ("eyes", BLUE), ("teeth", (20, 180, 40)))):
         file.node(mesh=file.mesh(ball_primitive(file, solid(file, color, name))), translation=[0.1 * number, 0, 0])
@@ -161,8 +161,8 @@ def colors_of(scene: Scene) -> list[list[int]]:
     return [o.material.maps.base_color[0, 0].tolist() for o in scene.objects]
 
 
-def test_several_materials_are_several_bodies_in_their_own_textures(tmp_path: Path) -> None:
-    scene, lines = told(head(tmp_path))
+def test_several_materials_are_several_bodies_with_their_textures(tmp_path: Path) -> None:
+    scene, lines = scene_and_notes(head(tmp_path))
     assert lines == []
     assert [o.mesh.name for o in scene.objects] == ["head head", "head eyes", "head teeth"]
     assert colors_of(scene) == [list(RED), list(BLUE), [20, 180, 40]]
@@ -171,18 +171,18 @@ def test_several_materials_are_several_bodies_in_their_own_textures(tmp_path: Pa
     assert strongest == [0, 2, 1], "red, blue and green from left to right"
 
 
-def test_a_chosen_material_is_worn_by_all_bodies_with_their_textures(tmp_path: Path) -> None:
+def test_a_chosen_material_applies_to_all_bodies_and_keeps_their_textures(tmp_path: Path) -> None:
     path = head(tmp_path)
-    scene, _ = told(path, material="skin")
+    scene, _ = scene_and_notes(path, material="skin")
     assert {o.material.name for o in scene.objects} == {"skin"} and len(scene.objects) == 3
     assert colors_of(scene) == [list(RED), list(BLUE), [20, 180, 40]]
-    assert all(o.material.base_color == (1, 1, 1) for o in scene.objects), "textures take the place of skin's colour"
-    tinted, _ = told(path, material={"preset": "skin", "base_color": [0.5, 1, 1]})
+    assert all(o.material.base_color == (1, 1, 1) for o in scene.objects), "textures replace the colour of skin"
+    tinted, _ = scene_and_notes(path, material={"preset": "skin", "base_color": [0.5, 1, 1]})
     assert all(o.material.base_color == (0.5, 1, 1) for o in tinted.objects)
 
 
-def test_several_materials_in_a_scene_file(tmp_path: Path) -> None:
-    """Each body is an object, and all are placed alike."""
+def test_bodies_of_a_mesh_in_a_scene_file_are_placed_together(tmp_path: Path) -> None:
+    """Each body is an object, and all have the same placement."""
     head(tmp_path)
     table = '[[object]]\nmesh = "head.glb"\ntranslate = [0, 500, 0]\nrotate = [0, 0, 90]\n'
     (tmp_path / "scene.toml").write_text(table)
@@ -190,12 +190,12 @@ def test_several_materials_in_a_scene_file(tmp_path: Path) -> None:
     scene = load_scene(tmp_path / "scene.toml")
     assert len(scene.objects) == 3 and colors_of(scene) == [list(RED), list(BLUE), [20, 180, 40]]
     np.testing.assert_allclose(scene.bounds, [[-50, 450, -50], [50, 750, 50]], atol=2)
-    assert [round(o.placed.mean(axis=0)[1]) for o in scene.objects] == [500, 600, 700], "x has become y"
+    assert [round(o.placed.mean(axis=0)[1]) for o in scene.objects] == [500, 600, 700], "x is rotated to y"
     assert {o.material.name for o in load_scene(tmp_path / "waxy.toml").objects} == {"ketchup"}
 
 
-def test_joined_as_one_mesh_what_differs_is_said(tmp_path: Path) -> None:
-    """Of `load_mesh`, which gives one body whatever the file."""
+def test_joining_parts_notes_the_differences(tmp_path: Path) -> None:
+    """`load_mesh` joins all parts of a file into one mesh."""
     path = head(tmp_path)
     with pytest.warns(UserWarning, match="base_color textures left out: the parts do not share a single one"):
         joined = load_mesh(path)
@@ -206,7 +206,7 @@ def test_joined_as_one_mesh_what_differs_is_said(tmp_path: Path) -> None:
 # --- where parts stand -----------------------------------------------------------------------------------------------
 
 
-def test_instances_are_as_nodes_that_stand_there(tmp_path: Path) -> None:
+def test_instances_are_drawn_like_nodes(tmp_path: Path) -> None:
     places = np.array([(0, 0, 0), (0.12, 0, 0), (0, 0.12, 0)])
     turns = np.array([(0, 0, 0, 1), (0, HALF, 0, HALF), (HALF, 0, 0, HALF)])
     scales = np.array([(1, 1, 1), (1, 2, 1), (0.5, 0.5, -0.5)])
@@ -229,7 +229,7 @@ def test_instances_are_as_nodes_that_stand_there(tmp_path: Path) -> None:
     assert differing(scene, expected) < 0.01
 
 
-def test_a_negative_scale_mirrors_and_keeps_the_outside_outside(tmp_path: Path) -> None:
+def test_a_negative_scale_mirrors_without_inverting_faces(tmp_path: Path) -> None:
     file = checkered(node={"scale": [-1, 1, 1]})
     mirrored = checkered()
     for name, sign in (("POSITION", [-1, 1, 1]),):
@@ -240,7 +240,7 @@ def test_a_negative_scale_mirrors_and_keeps_the_outside_outside(tmp_path: Path) 
     assert difference(loaded(file, tmp_path), loaded(mirrored, tmp_path)) == 0
 
 
-def test_one_mesh_plain_and_mirrored(tmp_path: Path) -> None:
+def test_one_mesh_is_shown_plain_and_mirrored(tmp_path: Path) -> None:
     file = File()
     mesh = file.mesh(ball_primitive(file))
     file.node(mesh=mesh, translation=[-0.06, 0, 0])
@@ -252,8 +252,8 @@ def test_one_mesh_plain_and_mirrored(tmp_path: Path) -> None:
     assert (np.einsum("ij,ij->i", outward, mesh_of.normals) > 45).all()
 
 
-def test_a_rotation_below_a_scale_shears(tmp_path: Path) -> None:
-    """No translation, rotation and scale give this matrix: positions and normals are those of the ellipsoid."""
+def test_a_rotated_child_of_a_scaled_node_is_sheared(tmp_path: Path) -> None:
+    """This matrix is not a product of translation, rotation and scale. The ball becomes an ellipsoid."""
     file = checkered(node={"rotation": [0, 0, math.sin(math.pi / 8), math.cos(math.pi / 8)]})
     primitive = file.tree["meshes"][0]["primitives"][0]
     primitive["attributes"]["NORMAL"] = file.rows(ball()[0] / RADIUS, "VEC3")
@@ -268,7 +268,7 @@ def test_a_rotation_below_a_scale_shears(tmp_path: Path) -> None:
 
 
 def test_normals_of_the_file_that_point_inwards_are_kept(tmp_path: Path) -> None:
-    """They are the file's own and say how it wants to be lit; its triangles say where the outside is."""
+    """Normals define the shading. The triangles define the outside."""
     file = checkered()
     normals = file.rows(-ball()[0] / RADIUS, "VEC3")
     file.tree["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals
@@ -277,8 +277,8 @@ def test_normals_of_the_file_that_point_inwards_are_kept(tmp_path: Path) -> None
     np.testing.assert_allclose(mesh.corner_normals, -mesh.positions[mesh.faces] / 50, atol=1e-5)
 
 
-def test_a_skin_takes_no_notice_of_where_its_node_stands(tmp_path: Path) -> None:
-    """A skinned mesh without an animation: its one joint is twice as large, its own node a hundredth and turned."""
+def test_a_skin_ignores_the_transform_of_its_node(tmp_path: Path) -> None:
+    """The joint of a skinned mesh is scaled by 2. The node of the mesh is scaled by 0.01 and rotated."""
     file = checkered()
     count = len(ball()[0])
     attributes = file.tree["meshes"][0]["primitives"][0]["attributes"]
@@ -293,13 +293,13 @@ def test_a_skin_takes_no_notice_of_where_its_node_stands(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("method", ["deon07", "sam"])
-def test_two_materials_are_drawn_by_methods_that_bake(tmp_path: Path, method: str) -> None:
-    """What either body shows is what it shows alone, under the same light and camera."""
+def test_methods_that_bake_draw_two_materials(tmp_path: Path, method: str) -> None:
+    """Each body looks as it does alone, with the same light and camera."""
     file = File()
     materials = [solid(file, color, name) for name, color in (("left", RED), ("right", BLUE))]
     for number, material in enumerate(materials):
         file.node(mesh=file.mesh(ball_primitive(file, material)), translation=[0.12 * number, 0, 0])
-    scene, _ = told(file, tmp_path, size_mm=22.0)
+    scene, _ = scene_and_notes(file, tmp_path, size_mm=22.0)
     knobs = {"map_size": 64} if method == "deon07" else {"surface": "screen"}
     pixels = render(scene, method, (48, 48), **knobs).pixels
     left, right = (pixels[20:28, x].mean(axis=0) for x in (12, 36))

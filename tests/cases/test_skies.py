@@ -1,4 +1,4 @@
-"""Environment images as other programs write them: suns, softboxes, odd headers, and channels of other kinds."""
+"""Environment images of other programs: suns, softboxes, unusual headers and channels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FROM_FRONT = OrthographicCamera((0, 0, 500), (0, 0, 0), height=42)
 
 
 def lit(*lights: Any) -> Scene:
-    """A ball in front of a camera, in some light."""
+    """Make a scene of a ball with a camera and lights."""
     return load_scene("sphere", vertices=4000, lights=lights, material=BLACK_BALL, camera=FROM_FRONT)
 
 
@@ -42,9 +42,11 @@ def write_hdr(path: Path, rows: bytes, width: int, height: int, header: str = ""
 # --- light -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_sun_of_one_texel_is_a_directional_light(tmp_path: Path) -> None:
-    """On black, at 1250 W/(m^2 sr): it lights as a sun from there does, without blobs. The texel's solid angle is that
-    between its rows, and the light comes from its middle."""
+def test_a_sun_of_one_texel_is_like_a_directional_light(tmp_path: Path) -> None:
+    """One texel of 1250 W/(m^2 sr) on black lights like a directional light from its centre.
+
+    Its solid angle is that between the borders of its row.
+    """
     height, width, row, column = 64, 128, 16, 64 + 8
     image = np.zeros((height, width, 3), np.float32)
     image[row, column] = 1250
@@ -52,7 +54,7 @@ def test_a_sun_of_one_texel_is_a_directional_light(tmp_path: Path) -> None:
     polar, turn = np.pi * (row + 0.5) / height, 2 * np.pi * ((column + 0.5) / width - 0.5)
     solid = 2 * np.pi / width * (np.cos(np.pi * row / height) - np.cos(np.pi * (row + 1) / height))
     towards = (np.sin(polar) * np.sin(turn), np.cos(polar), -np.sin(polar) * np.cos(turn))
-    travels = (float(towards[0]), float(-towards[1]), float(towards[2]))  # turned by half about +y, and reversed
+    travels = (float(towards[0]), float(-towards[1]), float(towards[2]))  # half a turn about y, then reversed
     by_image = render(lit(EnvironmentLight(file=path, rotation=180.0)), "lambert", (64, 64)).pixels
     by_sun = render(lit(DirectionalLight(travels, (1250 * solid,) * 3)), "lambert", (64, 64)).pixels
     bright = by_sun[..., 0] > 0.2 * by_sun[..., 0].max()
@@ -68,7 +70,7 @@ def test_two_softboxes_light_a_ball_smoothly(tmp_path: Path) -> None:
     inside = np.hypot(*np.mgrid[-31.5:32, -31.5:32]) < 28
     bends = np.abs(pixels[:, 2:] - 2 * pixels[:, 1:-1] + pixels[:, :-2])[inside[:, 1:-1]]
     assert pixels[inside].max() > 0
-    assert np.quantile(bends, 0.98) < 0.006 * pixels[inside].max(), "no facets: brightness bends nowhere sharply"
+    assert np.quantile(bends, 0.98) < 0.006 * pixels[inside].max(), "the brightness is smooth"
 
 
 # --- channels of EXR files -------------------------------------------------------------------------------------------
@@ -76,7 +78,7 @@ def test_two_softboxes_light_a_ball_smoothly(tmp_path: Path) -> None:
 SKY = np.random.default_rng(2).uniform(0.2, 1.0, (8, 16, 3)).astype(np.float32)
 
 
-def test_layers_of_other_programs(tmp_path: Path) -> None:
+def test_layers_are_chosen_by_the_names_of_other_programs(tmp_path: Path) -> None:
     planes = {name: np.ascontiguousarray(SKY[..., i]) for i, name in enumerate("RGB")}
     for prefix in ("", "ViewLayer.Combined.", "RenderLayer.", "rgba."):
         path = write_exr(tmp_path / "sky.exr", {f"{prefix}{name}": plane for name, plane in planes.items()})
@@ -89,8 +91,8 @@ def test_channels_of_mixed_types(tmp_path: Path) -> None:
     assert read_radiance(path) == pytest.approx(SKY, rel=1e-3)
 
 
-def test_luminance_and_chroma_are_colours(tmp_path: Path) -> None:
-    """Y beside RY and BY, not subsampled: the colours that they were made of."""
+def test_luminance_and_chroma_become_colours(tmp_path: Path) -> None:
+    """Y, RY and BY, not subsampled, give the original colours."""
     red, green, blue = np.moveaxis(SKY, 2, 0)
     Y = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     planes = {"Y": Y, "RY": (red - Y) / Y, "BY": (blue - Y) / Y}
@@ -99,7 +101,7 @@ def test_luminance_and_chroma_are_colours(tmp_path: Path) -> None:
 
 
 def test_chroma_that_is_not_finite_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As division by a luminance of 0 leaves it."""
+    """Chroma is not finite after a division by a luminance of 0."""
     planes = {name: SKY[..., i].copy() for i, name in enumerate(("Y", "RY", "BY"))}
     planes["RY"][2, 3] = np.nan
     path = write_exr(tmp_path / "sky.exr", planes)
@@ -114,17 +116,16 @@ def test_chroma_that_is_not_finite_is_one_line(tmp_path: Path, capsys: pytest.Ca
 
 
 def rgbe(pixels: Array) -> Array:
-    """uint8 (H, W, 4): shared exponents."""
+    """Encode pixels with shared exponents: uint8 (H, W, 4)."""
     top = pixels.max(axis=2, keepdims=True)
     exponent = np.floor(np.log2(top)) + 1
-    found = np.concatenate([np.floor(pixels / 2.0**exponent * 256), exponent + 128], axis=2)
-    return found.astype(np.uint8)
+    shared = np.concatenate([np.floor(pixels / 2.0**exponent * 256), exponent + 128], axis=2)
+    return shared.astype(np.uint8)
 
 
 @pytest.mark.parametrize("first", [(2, 2), (1, 1)])
-def test_flat_rows_that_begin_like_runs(tmp_path: Path, first: tuple[int, int]) -> None:
-    """A row whose first pixel is 2 2 … is flat all the same where what follows is not the row's width; 1 1 1 is how
-    the oldest files wrote a run."""
+def test_flat_rows_may_begin_like_runs(tmp_path: Path, first: tuple[int, int]) -> None:
+    """A row that begins with 2 2 is flat if the width of the row does not follow. 1 1 1 begins a run in old files."""
     flat = rgbe(SKY)
     flat[:, 0, :2] = first
     flat[:, 0, 2] = 200
@@ -163,7 +164,7 @@ def test_exposures_multiply(tmp_path: Path) -> None:
     assert read_radiance(path) == pytest.approx(SKY / 8, rel=0.02)
 
 
-def test_a_header_that_claims_a_huge_image_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_huge_image_is_refused_before_decoding(tmp_path: Path) -> None:
     path = write_hdr(tmp_path / "sky.hdr", b"\2\2\2\2" * 50, 999999, 32767)
     with pytest.raises(InputError, match=r"sky\.hdr: .*999999 x 32767"):
         read_radiance(path)

@@ -1,4 +1,4 @@
-"""Files with values that nobody would write on purpose: a scene, or one line that names the file."""
+"""Files with absurd values give a scene, or one line that names the file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import ball, ball_primitive, checkered, colored, encoded, texture, told
+from balls import ball, ball_primitive, checkered, colored, encoded, scene_and_notes, texture
 from gltfs import File
 
 from wgsss.cli.filetext import text_of
@@ -29,7 +29,7 @@ OPTIONS: tuple[dict[str, Any], ...] = (
 
 
 def whole() -> File:
-    """Two balls, one of them masked and animated, with a medium, a light and a camera."""
+    """Make a file of two balls, one masked and animated, with a medium, a light and a camera."""
     file = File()
     leaf = np.dstack([np.full((8, 8, 3), 90, np.uint8), np.eye(8, dtype=np.uint8) * 200 + 50])
     base = {"index": texture(file, encoded(leaf), sampler=file.add("samplers", wrapS=33071, magFilter=9728))}
@@ -64,16 +64,16 @@ def whole() -> File:
 
 
 def places(value: Any) -> list[tuple[Any, Any]]:
-    """Each object or list of a tree, with each of its keys or indices."""
+    """Yield each object or list of a tree with each of its keys or indices."""
     keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
     return [place for key in keys for place in ((value, key), *places(value[key]))]
 
 
 def spoilt(file: File, random_: random.Random) -> File:
-    """The file with one to three values removed, scaled or replaced, and perhaps some of its bytes."""
-    found = copy.deepcopy(file)
+    """Remove, scale or replace one to three values of a file, and in some cases change some bytes."""
+    changed = copy.deepcopy(file)
     for _ in range(random_.choice((1, 1, 2, 3))):
-        owner, key = random_.choice(places(found.tree))
+        owner, key = random_.choice(places(changed.tree))
         value = owner[key] if isinstance(owner, list) or key in owner else None
         if random_.random() < 0.15:
             del owner[key]
@@ -82,12 +82,12 @@ def spoilt(file: File, random_: random.Random) -> File:
         else:
             owner[key] = copy.deepcopy(random_.choice(VALUES))
     for _ in range(random_.choice((0, 0, 0, 20))):
-        found.data[random_.randrange(len(found.data))] = random_.randrange(256)
-    return found
+        changed.data[random_.randrange(len(changed.data))] = random_.randrange(256)
+    return changed
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_spoilt_files_give_a_scene_or_one_line(tmp_path: Path, seed: int) -> None:
+def test_modified_files_give_a_scene_or_one_line(tmp_path: Path, seed: int) -> None:
     file, random_, scenes = whole(), random.Random(seed), 0
     for number in range(40):
         path = spoilt(file, random_).save(tmp_path / "spoilt.glb")
@@ -105,11 +105,11 @@ def test_spoilt_files_give_a_scene_or_one_line(tmp_path: Path, seed: int) -> Non
             except InputError as error:
                 assert str(error).startswith(f"{path}: "), "it names the file"
                 assert "\n" not in str(error) and len(str(error)) < 400
-    assert scenes >= 4, "not all is refused"
+    assert scenes >= 4, "some modified files are read"
 
 
-def test_a_file_that_is_not_spoilt(tmp_path: Path) -> None:
-    scene, lines = told(whole(), tmp_path)
+def test_the_unmodified_file_is_read(tmp_path: Path) -> None:
+    scene, lines = scene_and_notes(whole(), tmp_path)
     assert len(scene.objects) == 2
     assert len(lines) == 4
     for words in ("boundary edge", "interpolated", "1 light", "1 camera"):
@@ -120,26 +120,26 @@ def test_a_part_too_small_to_be_seen_is_left_out(tmp_path: Path) -> None:
     file = checkered()
     tiny = file.add("materials", name="dust", pbrMetallicRoughness={"metallicFactor": 0, "roughnessFactor": 0.5})
     file.node(mesh=file.mesh(ball_primitive(file, tiny)), scale=[1e-12] * 3)
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert len(scene.objects) == 1 and len(lines) == 1
     assert lines[0].startswith("dust: ") or lines[0].startswith("all ")
     assert "left out" in lines[0]
 
 
 @pytest.mark.parametrize("kind", ["point", "directional"])
-def test_a_light_beyond_all_bounds_is_named(tmp_path: Path, kind: str) -> None:
+def test_a_light_that_is_not_finite_is_named(tmp_path: Path, kind: str) -> None:
     file = checkered()
     file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": kind, "intensity": 1e32, "name": "Sun"}]}}
     file.node(extensions={"KHR_lights_punctual": {"light": 0}})
     path = file.save(tmp_path / "ball.glb")
-    assert told(path)[0].objects
+    assert scene_and_notes(path)[0].objects
     with pytest.raises(InputError, match=r"ball\.glb: light 0 \(Sun\): (intensity|irradiance) must be"):
         load_scene(path, file_lights=True)
 
 
-def test_slopes_beyond_all_bounds_are_said(tmp_path: Path) -> None:
+def test_an_extreme_normal_scale_is_noted(tmp_path: Path) -> None:
     file = checkered()
     file.tree["materials"][0]["normalTexture"] = {"index": 0, "scale": -5000}
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert lines == ["a normal scale of -5000 taken as -100"]
     assert scene.objects[0].material.maps.normal_scale == -100

@@ -1,4 +1,4 @@
-"""OBJ, PLY and STL files as other programs write them: the same picture as a plain file of the same surface."""
+"""OBJ, PLY and STL files of other programs give the same picture as a plain file of the same surface."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from balls import BLUE, RED, ball, checker, difference, differing, encoded, picture, told
+from balls import BLUE, RED, ball, checker, difference, differing, encoded, picture, scene_and_notes
 
 from wgsss.errors import InputError
 from wgsss.scene import Mesh, Scene, load_scene
@@ -22,7 +22,7 @@ SIDES = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (
 
 
 def quiet(path: Path, **options: Any) -> Scene:
-    """The scene of a file, any warning an error."""
+    """Load the scene of a file. Any warning is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return load_scene(path, **options)
@@ -33,11 +33,11 @@ def volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-# --- OBJ: three boxes in a row, however they are written -------------------------------------------------------------
+# --- OBJ: three boxes in a row, in every notation --------------------------------------------------------------------
 
 
 def boxes(negative: bool = False, blocks: bool = False) -> str:
-    """Vertices and faces of all boxes one after the other, or box by box."""
+    """Return the text of three boxes: first all vertices and then all faces, or box by box."""
     vertices, faces = [], []
     for number, middle in enumerate((-40, 0, 40)):
         vertices.append([f"v {x + middle} {y} {z}" for x, y, z in CORNERS])
@@ -80,7 +80,7 @@ WRITTEN: dict[str, bytes] = {
 
 
 @pytest.mark.parametrize("name", WRITTEN)
-def test_three_boxes_however_they_are_written(tmp_path: Path, name: str) -> None:
+def test_every_notation_gives_the_same_three_boxes(tmp_path: Path, name: str) -> None:
     (tmp_path / "plain.obj").write_text(boxes())
     (tmp_path / "boxes.obj").write_bytes(WRITTEN[name])
     scene, plain = quiet(tmp_path / "boxes.obj"), quiet(tmp_path / "plain.obj")
@@ -94,8 +94,8 @@ L_SHAPE = [(0, 0), (40, 0), (40, 15), (15, 15), (15, 40), (0, 40)]
 
 @pytest.mark.parametrize("start", range(6))
 @pytest.mark.parametrize("plane", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
-def test_a_concave_polygon_covers_what_it_bounds(tmp_path: Path, start: int, plane: tuple[int, int, int]) -> None:
-    """An L of six corners, whichever of them the file begins with and whichever way it faces."""
+def test_a_concave_polygon_covers_its_area(tmp_path: Path, start: int, plane: tuple[int, int, int]) -> None:
+    """The faces of an L of six corners begin at any corner and face any axis."""
     outline = L_SHAPE[start:] + L_SHAPE[:start]
     points = [tuple(float(p) for p in np.array((*xy, z))[list(plane)]) for z in (0, 10) for xy in outline]
     sides = [(i + 1, (i + 1) % 6 + 1, (i + 1) % 6 + 7, i + 7) for i in range(6)]
@@ -104,7 +104,7 @@ def test_a_concave_polygon_covers_what_it_bounds(tmp_path: Path, start: int, pla
     (tmp_path / "l.obj").write_text(text)
     mesh = quiet(tmp_path / "l.obj").objects[0].mesh
     flat = 40 * 15 + 15 * 25
-    assert mesh.area == pytest.approx(2 * flat + 10 * 160), "a fan from the wrong corner has more"
+    assert mesh.area == pytest.approx(2 * flat + 10 * 160), "a fan from a wrong corner would have a larger area"
     assert volume(mesh) == pytest.approx(10 * flat)
 
 
@@ -112,7 +112,7 @@ def test_a_concave_polygon_covers_what_it_bounds(tmp_path: Path, start: int, pla
 
 
 def ball_obj(mtl: str = "ball.mtl", without: float = 0.0) -> str:
-    """The ball in mm with texture coordinates, less those of a share of its faces."""
+    """Return the text of a ball, in mm. A share of its faces, `without`, has no texture coordinates."""
     points, uvs, faces = ball(50.0)
     lines = [f"mtllib {mtl}", "usemtl skin", *("v {} {} {}".format(*p) for p in points)]
     lines += [f"vt {u} {1 - v}" for u, v in uvs]
@@ -124,7 +124,7 @@ def ball_obj(mtl: str = "ball.mtl", without: float = 0.0) -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A ball with a checker: an .obj, its .mtl and an image in a folder of its own."""
+    """Write a ball with a checker: an .obj file, its .mtl file, and an image in a subfolder."""
     (tmp_path / "maps").mkdir()
     (tmp_path / "maps" / "checker.png").write_bytes(encoded(checker()))
     (tmp_path / "ball.mtl").write_text("newmtl skin\nKd 1 1 1\nmap_Kd maps/checker.png\n")
@@ -145,11 +145,11 @@ def folder(tmp_path: Path) -> Path:
         "C:\\work\\maps\\checker.png",
     ],
 )
-def test_a_texture_by_other_letter_case_and_slashes(folder: Path, name: str) -> None:
-    """Found, as on the machine that wrote it, or said to be missing, but never lost in silence."""
+def test_a_texture_in_another_letter_case_or_with_other_slashes(folder: Path, name: str) -> None:
+    """The texture is read or reported as missing."""
     plain = quiet(folder / "ball.obj")
     (folder / "ball.mtl").write_text(f"newmtl skin\nKd 1 1 1\nmap_Kd {name}\n")
-    scene, lines = told(folder / "ball.obj")
+    scene, lines = scene_and_notes(folder / "ball.obj")
     if scene.objects[0].material.maps.base_color is None:
         assert len(lines) == 1 and "checker.png" in lines[0].lower()
     else:
@@ -158,37 +158,37 @@ def test_a_texture_by_other_letter_case_and_slashes(folder: Path, name: str) -> 
         assert scene.objects[0].material.maps.base_color is not None
 
 
-def test_a_missing_texture_is_said(folder: Path) -> None:
+def test_a_missing_texture_is_noted(folder: Path) -> None:
     (folder / "ball.mtl").write_text("newmtl skin\nmap_Kd maps/gone.png\n")
-    scene, lines = told(folder / "ball.obj")
+    scene, lines = scene_and_notes(folder / "ball.obj")
     assert len(lines) == 1 and "gone.png" in lines[0]
     assert scene.objects[0].material.maps.base_color is None
 
 
-def test_a_missing_material_file_is_said(folder: Path) -> None:
+def test_a_missing_material_file_is_noted(folder: Path) -> None:
     (folder / "ball.mtl").unlink()
-    assert any("'ball.mtl' does not exist" in line for line in told(folder / "ball.obj")[1])
+    assert any("'ball.mtl' does not exist" in line for line in scene_and_notes(folder / "ball.obj")[1])
 
 
-def test_the_constant_colour_of_a_material(folder: Path) -> None:
+def test_a_material_without_texture_has_its_colour(folder: Path) -> None:
     (folder / "ball.mtl").write_text("newmtl skin\nKd 0.2 0.4 0.8\n")
     assert quiet(folder / "ball.obj").objects[0].material.base_color != (1, 1, 1)
 
 
-def test_half_of_the_faces_have_texture_coordinates(folder: Path) -> None:
-    """The texture stays on those, and the others are counted."""
+def test_half_of_the_faces_may_have_texture_coordinates(folder: Path) -> None:
+    """These faces keep the texture, and the others are counted."""
     plain = quiet(folder / "ball.obj")
     (folder / "ball.obj").write_text(ball_obj(without=0.5))
-    scene, lines = told(folder / "ball.obj")
+    scene, lines = scene_and_notes(folder / "ball.obj")
     faces = len(ball()[2])
     assert [line for line in lines if f"{faces // 2} of {faces} faces" in line and "texture coordinates" in line]
     maps, mesh = scene.objects[0].material.maps, scene.objects[0].mesh
     assert maps.base_color is not None and mesh.corner_uvs is not None
-    assert 0.1 < differing(scene, plain) < 0.5, "the lower half is as it was"
+    assert 0.1 < differing(scene, plain) < 0.5, "the lower half is unchanged"
 
 
 def test_several_materials_are_several_bodies(folder: Path) -> None:
-    """A ball whose upper half is red and lower half blue."""
+    """The upper half of a ball is red, and the lower half is blue."""
     for name, color in (("red", RED), ("blue", BLUE)):
         (folder / f"{name}.png").write_bytes(encoded(np.full((2, 2, 3), color, np.uint8)))
     (folder / "ball.mtl").write_text("newmtl red\nmap_Kd red.png\n\nnewmtl blue\nmap_Kd blue.png\n")
@@ -199,9 +199,9 @@ def test_several_materials_are_several_bodies(folder: Path) -> None:
     order = ball()[2].mean(axis=1).argsort().tolist()
     upper, lower = [faces[i] for i in order[:half]], [faces[i] for i in order[half:]]
     (folder / "ball.obj").write_text("\n".join([*rest, "usemtl red", *upper, "usemtl blue", *lower]))
-    scene, said = told(folder / "ball.obj")
+    scene, lines = scene_and_notes(folder / "ball.obj")
     assert [o.mesh.name for o in scene.objects] == ["ball red", "ball blue"]
-    assert all("boundary" in line for line in said), "each half is open"
+    assert all("boundary" in line for line in lines), "each half is open"
     seen = picture(scene)
     assert seen[14, 32, 0] > seen[14, 32, 2] and seen[50, 32, 2] > seen[50, 32, 0]
 
@@ -210,7 +210,7 @@ def test_several_materials_are_several_bodies(folder: Path) -> None:
 
 
 def ply(form: str, vertex: dict[str, tuple[str, Array]], extra_face: dict[str, tuple[str, int]] | None = None) -> bytes:
-    """A ball whose vertices have properties by name: PLY's type, and the values."""
+    """Write a ball as PLY. Its vertices have properties: the type and the values by name."""
     kinds = {"float": "f4", "double": "f8", "uchar": "u1", "ushort": "u2", "int": "i4", "float32": "f4", "uint8": "u1"}
     faces = ball()[2]
     order = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}[form]
@@ -245,20 +245,20 @@ FORMS = ["ascii", "binary_little_endian", "binary_big_endian"]
 @pytest.fixture
 def plain_ply(tmp_path: Path) -> Scene:
     (tmp_path / "plain.ply").write_bytes(ply("binary_little_endian", places()))
-    return told(tmp_path / "plain.ply")[0]
+    return scene_and_notes(tmp_path / "plain.ply")[0]
 
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("kind", ["float", "double", "float32"])
-def test_ply_of_every_form_and_type(tmp_path: Path, plain_ply: Scene, form: str, kind: str) -> None:
+def test_ply_of_every_format_and_type(tmp_path: Path, plain_ply: Scene, form: str, kind: str) -> None:
     (tmp_path / "ball.ply").write_bytes(ply(form, places(kind)))
-    assert difference(told(tmp_path / "ball.ply")[0], plain_ply) == 0
+    assert difference(scene_and_notes(tmp_path / "ball.ply")[0], plain_ply) == 0
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_further_properties_of_faces_are_named(tmp_path: Path, plain_ply: Scene, form: str) -> None:
+def test_unknown_properties_of_faces_are_named(tmp_path: Path, plain_ply: Scene, form: str) -> None:
     (tmp_path / "ball.ply").write_bytes(ply(form, places(), {"material_index": ("int", 7), "quality": ("float", 2)}))
-    scene, lines = told(tmp_path / "ball.ply")
+    scene, lines = scene_and_notes(tmp_path / "ball.ply")
     assert difference(scene, plain_ply) == 0
     naming = [line for line in lines if "material_index" in line and "quality" in line]
     assert len(naming) == 1
@@ -267,21 +267,21 @@ def test_further_properties_of_faces_are_named(tmp_path: Path, plain_ply: Scene,
 @pytest.mark.parametrize(("kind", "top"), [("uchar", 255), ("ushort", 65535), ("float", 1.0)])
 @pytest.mark.parametrize("form", ["ascii", "binary_big_endian"])
 def test_vertex_colours_of_ply_are_the_base_colour(tmp_path: Path, form: str, kind: str, top: float) -> None:
-    """Red above and blue below; what else vertices have is named."""
+    """Vertices are red above and blue below. Other properties are named in a note."""
     share = ball()[1][:, 1]
     shades = {"red": 1 - share, "green": 0 * share, "blue": share}
     colors = {name: (kind, np.round(top * s) if top > 1 else s) for name, s in shades.items()}
     vertex = {**places(), "quality": ("float", np.arange(len(share))), **colors}
     (tmp_path / "ball.ply").write_bytes(ply(form, vertex))
-    scene, lines = told(tmp_path / "ball.ply")
+    scene, lines = scene_and_notes(tmp_path / "ball.ply")
     assert scene.objects[0].mesh.corner_colors is not None
     seen = picture(scene)
     assert seen[12, 32, 0] > 1.2 * seen[12, 32, 2] and seen[52, 32, 2] > 1.2 * seen[52, 32, 0]
     assert [line for line in lines if "quality" in line and "red" not in line]
 
 
-def test_strips_of_ply(tmp_path: Path) -> None:
-    """The Stanford archive's way: all faces as one list, strips parted by -1."""
+def test_ply_faces_may_be_strips(tmp_path: Path) -> None:
+    """The Stanford archive stores all faces as one list of strips, separated by -1."""
     text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
     text += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
     text += "\n".join("{} {} {}".format(*c) for c in CORNERS)
@@ -295,7 +295,7 @@ def test_strips_of_ply(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("head", [b"solid made by a program that lies", b"solid", b"\0" * 80])
-def test_binary_stl_whatever_its_header_says(tmp_path: Path, plain_ply: Scene, head: bytes) -> None:
+def test_binary_stl_with_any_header(tmp_path: Path, plain_ply: Scene, head: bytes) -> None:
     points, _, faces = ball(50.0)
     body = b"".join(struct.pack("<12fH", 0, 0, 0, *np.ravel(points[face]), 0) for face in faces)
     (tmp_path / "ball.stl").write_bytes(head.ljust(80, b" ") + struct.pack("<I", len(faces)) + body)
@@ -305,14 +305,14 @@ def test_binary_stl_whatever_its_header_says(tmp_path: Path, plain_ply: Scene, h
 # --- shapes ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_face_on_an_edge_that_has_two_is_kept_and_said(tmp_path: Path) -> None:
+def test_a_third_face_at_an_edge_is_kept_and_noted(tmp_path: Path) -> None:
     (tmp_path / "fin.obj").write_text(boxes() + "v 0 40 0\nf 3 4 25\n")
-    scene, lines = told(tmp_path / "fin.obj")
+    scene, lines = scene_and_notes(tmp_path / "fin.obj")
     assert len(scene.objects[0].mesh.faces) == 37 and scene.bounds[1, 1] == 40
     assert len(lines) == 1 and "1 edge of more than two faces" in lines[0]
 
 
-def test_what_is_no_mesh_at_all_says_so(tmp_path: Path) -> None:
+def test_files_that_are_no_meshes_are_errors(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text("hello\n")
     with pytest.raises(InputError, match=r"a\.obj: the mesh is empty"):
         load_scene(tmp_path / "a.obj")

@@ -1,4 +1,4 @@
-"""Textures of glTF files: where their images are, over which coordinates they lie, and how they are read."""
+"""Textures of glTF files: their image files, texture coordinates, samplers and bit depths."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from balls import (
     encoded,
     loaded,
     picture,
+    scene_and_notes,
     texture,
-    told,
     transformed,
 )
 from gltfs import File
@@ -37,7 +37,7 @@ Array = np.ndarray[Any, Any]
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """A ball with a checker."""
+    """Load a ball with a checker."""
     return loaded(checkered(), tmp_path_factory.mktemp("plain"))
 
 
@@ -50,7 +50,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Scene:
         ("map.png", "map.png"),
         ("tex%20map.png", "tex map.png"),
         ("tex map.png", "tex map.png"),
-        ("tex%20map.png", "tex%20map.png"),  # a writer that did not encode
+        ("tex%20map.png", "tex%20map.png"),  # a program that does not encode URIs
         ("f%C3%BCr%20%E7%9A%AE.png", "für 皮.png"),
         ("für 皮.png", "für 皮.png"),
         ("a%23b%3Fc%2Bd.png", "a#b?c+d.png"),
@@ -63,14 +63,14 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Scene:
         ("maps\\a.png", "maps/a.png"),
     ],
 )
-def test_images_are_found_by_their_names(tmp_path: Path, plain: Scene, uri: str, name: str) -> None:
+def test_image_files_are_found_by_their_uris(tmp_path: Path, plain: Scene, uri: str, name: str) -> None:
     (tmp_path / "maps").mkdir()
     (tmp_path / name).write_bytes(encoded(checker()))
     assert difference(loaded(checkered(uri), tmp_path / "ball.gltf"), plain) == 0
 
 
 @pytest.mark.parametrize(("uri", "name"), [("bin%20file.bin", "bin file.bin"), ("b#%C3%A4.bin", "b#ä.bin")])
-def test_buffers_are_found_by_their_names(tmp_path: Path, plain: Scene, uri: str, name: str) -> None:
+def test_buffer_files_are_found_by_their_uris(tmp_path: Path, plain: Scene, uri: str, name: str) -> None:
     file = checkered()
     file.tree["buffers"] = [{"byteLength": len(file.data), "uri": uri}]
     path = file.save(tmp_path / "ball.gltf")
@@ -78,12 +78,12 @@ def test_buffers_are_found_by_their_names(tmp_path: Path, plain: Scene, uri: str
     assert difference(load_scene(path), plain) == 0
 
 
-def test_an_image_that_is_missing_or_damaged_is_said_once(tmp_path: Path) -> None:
+def test_a_missing_or_damaged_image_is_noted_once(tmp_path: Path) -> None:
     for image, words in ((b"no image", "damaged, or not an image"), ("gone.png", "'gone.png'")):
         file = File()
         material = colored(file, image)
         file.node(mesh=file.mesh(ball_primitive(file, material), ball_primitive(file, material, (0.2, 0, 0))))
-        scene, lines = told(file, tmp_path / "ball.gltf")
+        scene, lines = scene_and_notes(file, tmp_path / "ball.gltf")
         assert len(lines) == 1 and words in lines[0] and "image 0" in lines[0]
         assert scene.objects[0].material.maps.base_color is None
 
@@ -91,7 +91,7 @@ def test_an_image_that_is_missing_or_damaged_is_said_once(tmp_path: Path) -> Non
 # --- coordinates -----------------------------------------------------------------------------------------------------
 
 
-def test_a_texture_over_the_second_set_of_coordinates(tmp_path: Path, plain: Scene) -> None:
+def test_a_texture_may_use_the_second_set_of_coordinates(tmp_path: Path, plain: Scene) -> None:
     file = File()
     attributes = {"TEXCOORD_0": file.rows(ball()[1] * 0, "VEC2"), "TEXCOORD_1": file.rows(ball()[1], "VEC2")}
     file.node(mesh=file.mesh(ball_primitive(file, colored(file, texCoord=1), attributes=attributes)))
@@ -106,7 +106,7 @@ def test_a_transform_may_name_the_set_of_coordinates(tmp_path: Path, plain: Scen
     assert difference(loaded(file, tmp_path), plain) == 0
 
 
-def test_of_two_textures_over_two_sets_the_second_is_left_out_and_said(tmp_path: Path, plain: Scene) -> None:
+def test_a_second_texture_over_another_set_is_left_out_with_a_note(tmp_path: Path, plain: Scene) -> None:
     file = File()
     bumps = texture(file, encoded(np.full((4, 4, 3), (128, 128, 255), np.uint8)))
     material = file.add(
@@ -116,15 +116,15 @@ def test_of_two_textures_over_two_sets_the_second_is_left_out_and_said(tmp_path:
     )
     attributes = {"TEXCOORD_1": file.rows(ball()[1] * 2, "VEC2")}
     file.node(mesh=file.mesh(ball_primitive(file, material, attributes=attributes)))
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert len([line for line in lines if "normal texture image 0 left out" in line]) == 1
     assert scene.objects[0].material.maps.normal is None
     assert difference(scene, plain) <= 1
 
 
 @pytest.mark.parametrize(("spread", "left_out"), [(1, False), (2, True)])
-def test_two_textures_whose_samplers_differ(tmp_path: Path, spread: float, left_out: bool) -> None:
-    """That does not matter where no coordinate is beyond the image; else the second one is left out and said."""
+def test_two_textures_with_different_samplers(tmp_path: Path, spread: float, left_out: bool) -> None:
+    """If coordinates exceed the image, the second texture is left out with a note. Otherwise both are used."""
     file = File()
     file.add("samplers", wrapS=33071, wrapT=33071)
     bumps = texture(file, encoded(np.full((4, 4, 3), (128, 128, 255), np.uint8)))
@@ -132,12 +132,12 @@ def test_two_textures_whose_samplers_differ(tmp_path: Path, spread: float, left_
     material = file.add("materials", pbrMetallicRoughness=base, normalTexture={"index": bumps})
     attributes = {"TEXCOORD_0": file.rows(ball()[1] * spread, "VEC2")}
     file.node(mesh=file.mesh(ball_primitive(file, material, attributes=attributes)))
-    scene, lines = told(file, tmp_path)
+    scene, lines = scene_and_notes(file, tmp_path)
     assert (scene.objects[0].material.maps.normal is None) == left_out
     assert lines == (["normal texture image 0 left out: it repeats otherwise than image 1"] if left_out else [])
 
 
-def test_two_textures_over_one_set_are_both_worn(tmp_path: Path) -> None:
+def test_two_textures_over_one_set_are_both_used(tmp_path: Path) -> None:
     file = File()
     slant = np.full((2, 2, 3), (200, 128, 230), np.uint8)
     material = file.add(
@@ -163,7 +163,7 @@ def test_two_textures_over_one_set_are_both_worn(tmp_path: Path) -> None:
         {"offset": [-2.5, 0.3], "rotation": -2.0, "scale": [-1, 0.5]},
     ],
 )
-def test_a_texture_transform_is_as_coordinates_that_hold_it(
+def test_a_texture_transform_is_like_transformed_coordinates(
     tmp_path: Path, sampler: dict[str, int], transform: dict[str, Any]
 ) -> None:
     pictures = []
@@ -183,8 +183,8 @@ def test_a_texture_transform_is_as_coordinates_that_hold_it(
     assert len(np.unique(first[..., 0])) > 20
 
 
-def test_a_texture_that_is_not_interpolated(tmp_path: Path) -> None:
-    """Four texels on a whole ball: with NEAREST, only two colours are there."""
+def test_a_texture_with_nearest_filter(tmp_path: Path) -> None:
+    """A ball has four texels. With NEAREST, only two colours appear."""
     shown = []
     for sampler in ({"magFilter": 9728, "minFilter": 9728}, {"magFilter": 9729}):
         file = File()
@@ -207,7 +207,7 @@ RAMP = np.broadcast_to(np.arange(256, dtype=np.uint8), (4, 256))
 
 
 def ramp(depth: str) -> bytes:
-    """A grey ramp from black to white over 256 texels."""
+    """Return a grey ramp from black to white over 256 texels."""
     from PIL import Image
 
     wide = RAMP.astype(np.uint16) * 257
@@ -240,7 +240,7 @@ def saved(image: Any, kind: str) -> bytes:
 
 
 def png_16(pixels: Array) -> bytes:
-    """A PNG of 16 bits for each of three or four channels, which Pillow cannot write."""
+    """Encode a PNG of 16 bits with three or four channels, which Pillow cannot write."""
     height, width, channels = pixels.shape
     rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in pixels)
     head = struct.pack(">2I5B", width, height, 16, 2 if channels == 3 else 6, 0, 0, 0)
@@ -251,7 +251,7 @@ def png_16(pixels: Array) -> bytes:
 
 @pytest.fixture(scope="module")
 def grey(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """A ball with the ramp in 8 bits."""
+    """Load a ball with the ramp in 8 bits."""
     return loaded(checkered(ramp("grey 8")), tmp_path_factory.mktemp("grey"))
 
 
@@ -269,7 +269,7 @@ def grey(tmp_path_factory: pytest.TempPathFactory) -> Scene:
         "tiff half",
     ],
 )
-def test_images_of_every_depth_show_the_same_ramp(tmp_path: Path, grey: Scene, depth: str) -> None:
+def test_images_of_every_bit_depth_show_the_same_ramp(tmp_path: Path, grey: Scene, depth: str) -> None:
     scene = loaded(checkered(ramp(depth)), tmp_path)
     pixels = scene.objects[0].material.maps.base_color
     assert pixels is not None and pixels.dtype == np.uint8
@@ -279,7 +279,7 @@ def test_images_of_every_depth_show_the_same_ramp(tmp_path: Path, grey: Scene, d
 
 @pytest.mark.parametrize("bits", [1, 2, 4])
 def test_images_of_few_bits(tmp_path: Path, bits: int) -> None:
-    """Written by hand, since libraries write 8 bits: a PNG whose texels share bytes."""
+    """The texels of the PNG share bytes. It is encoded here because libraries write 8 bits."""
     count = 1 << bits
     packed = np.packbits(((np.arange(8)[:, None] % count >> np.arange(bits)[::-1]) & 1).astype(np.uint8))
     head = struct.pack(">2I5B", 8, 1, bits, 0, 0, 0, 0)
@@ -291,7 +291,7 @@ def test_images_of_few_bits(tmp_path: Path, bits: int) -> None:
     assert pixels[0, :, 0].tolist() == [255 * (i % count) // (count - 1) for i in range(8)]
 
 
-def test_a_jpeg_of_four_inks(tmp_path: Path, plain: Scene) -> None:
+def test_a_cmyk_jpeg_is_read(tmp_path: Path, plain: Scene) -> None:
     from PIL import Image
 
     image = Image.fromarray(checker(size=128)).convert("CMYK")
@@ -303,33 +303,35 @@ def test_a_jpeg_of_four_inks(tmp_path: Path, plain: Scene) -> None:
     assert np.abs(pixels[8, 8].astype(int) - RED).max() < 12 and np.abs(pixels[8, 24].astype(int) - BLUE).max() < 12
 
 
-def test_alpha_below_an_opaque_material_keeps_its_colour(tmp_path: Path, plain: Scene) -> None:
+def test_alpha_does_not_change_the_colour_of_an_opaque_material(tmp_path: Path, plain: Scene) -> None:
     hidden = np.dstack([checker(), np.zeros((64, 64), np.uint8)])
     assert difference(loaded(checkered(encoded(hidden)), tmp_path), plain) == 0
 
 
 @pytest.mark.parametrize("shape", [(1, MAX_SIDE + 1), (MAX_SIDE + 1, 1)])
 def test_a_texture_larger_than_a_device_can_hold_is_left_out(tmp_path: Path, shape: tuple[int, int]) -> None:
-    scene, lines = told(checkered(encoded(np.zeros((*shape, 3), np.uint8))), tmp_path)
+    scene, lines = scene_and_notes(checkered(encoded(np.zeros((*shape, 3), np.uint8))), tmp_path)
     size = f"{shape[1]} x {shape[0]} pixels; at most {MAX_SIDE} on a side are possible"
     assert len(lines) == 1 and size in lines[0] and "image 0" in lines[0]
     assert scene.objects[0].material.maps.base_color is None
 
 
 def test_a_huge_texture_is_left_out_before_it_is_decoded(tmp_path: Path) -> None:
-    """A header of 50000 x 50000 pixels, and nothing that could be decoded behind it."""
+    """The file has a header of 50000 x 50000 pixels and no pixels."""
     head = struct.pack(">2I5B", 50000, 50000, 8, 2, 0, 0, 0)
     chunk = struct.pack(">I", len(head)) + b"IHDR" + head + struct.pack(">I", zlib.crc32(b"IHDR" + head))
     idat = struct.pack(">I", 2) + b"IDATxx" + struct.pack(">I", zlib.crc32(b"IDATxx"))
-    _, lines = told(checkered(b"\x89PNG\r\n\x1a\n" + chunk + idat), tmp_path)
+    _, lines = scene_and_notes(checkered(b"\x89PNG\r\n\x1a\n" + chunk + idat), tmp_path)
     assert len(lines) == 1 and "50000 x 50000 pixels" in lines[0]
 
 
 def test_bumps_on_mirrored_coordinates_are_mirrored(tmp_path: Path) -> None:
-    """A map that leans to the right and up, on coordinates that run the other way round: it leans to the left and up.
-    Both are compared with the ball without a map."""
+    """A normal map that tilts right and up tilts left and up if the coordinates are mirrored.
+
+    Both results are compared with the ball without a map.
+    """
     uvs = ball()[1]
-    found, slant = [], (210, 180, 220)
+    normals, slant = [], (210, 180, 220)
     for coordinates, slope in ((uvs, (128, 128, 255)), (uvs, slant), (uvs * [-1, 1] + [1, 0], slant)):
         file = File()
         bumps = {"index": texture(file, encoded(np.full((2, 2, 3), slope, np.uint8)))}
@@ -337,11 +339,11 @@ def test_bumps_on_mirrored_coordinates_are_mirrored(tmp_path: Path) -> None:
         attributes = {"TEXCOORD_0": file.rows(coordinates, "VEC2")}
         file.node(mesh=file.mesh(ball_primitive(file, material, attributes=attributes)))
         scene = loaded(file, tmp_path)
-        found.append(render(scene, "lambert", (48, 48), aovs=("normal",)).aovs["normal"])
-    flat, right, left = found
+        normals.append(render(scene, "lambert", (48, 48), aovs=("normal",)).aovs["normal"])
+    flat, right, left = normals
     eastwards = np.cross([0, 1, 0], flat)
     middle = np.linalg.norm(eastwards, axis=2) > 0.7  # not near the poles
     for axis, sign in ((eastwards, -1), (np.broadcast_to([0, 1, 0], flat.shape), 1)):
         first, second = (np.einsum("ijk,ijk->ij", bent - flat, axis)[middle] for bent in (right, left))
         assert (first > 0.05).mean() > 0.95
-        assert second == pytest.approx(sign * first, abs=0.2), "but for how faces are skewed"
+        assert second == pytest.approx(sign * first, abs=0.2), "the rest is due to skewed faces"

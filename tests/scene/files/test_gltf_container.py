@@ -26,24 +26,24 @@ def refused(path: Path) -> str:
 
 def test_both_forms_have_the_same_contents(tmp_path: Path) -> None:
     for name in ("box.glb", "box.gltf"):
-        contents = read_gltf(File().shown().save(tmp_path / name))
+        contents = read_gltf(File().with_tetrahedron().save(tmp_path / name))
         assert contents.parts[0].positions.tolist() == TETRAHEDRON.tolist()
         assert contents.mm_per_unit == 1000 and contents.states_unit and contents.notes == ()
 
 
 def test_the_form_is_recognised_by_content_not_by_extension(tmp_path: Path) -> None:
-    (tmp_path / "box.gltf").write_bytes(File().shown().glb())
+    (tmp_path / "box.gltf").write_bytes(File().with_tetrahedron().glb())
     assert len(read_gltf(tmp_path / "box.gltf").parts) == 1
 
 
 def test_unknown_chunks_are_skipped_and_padding_does_not_matter(tmp_path: Path) -> None:
     path = tmp_path / "box.glb"
-    path.write_bytes(File().shown().glb((b"ABCD", b"12345"), (b"JSON", b"{}")) + b"trailing")
+    path.write_bytes(File().with_tetrahedron().glb((b"ABCD", b"12345"), (b"JSON", b"{}")) + b"trailing")
     assert len(read_gltf(path).parts) == 1
 
 
 def test_a_byte_order_mark_and_bytes_that_are_not_utf8(tmp_path: Path) -> None:
-    path = File().shown(name="skin").save(tmp_path / "box.gltf")
+    path = File().with_tetrahedron(name="skin").save(tmp_path / "box.gltf")
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"skin", b"sk\xefn"))
     assert read_gltf(path).parts[0].look.name == "sk\ufffdn"
 
@@ -60,19 +60,19 @@ def test_a_byte_order_mark_and_bytes_that_are_not_utf8(tmp_path: Path) -> None:
     ],
 )
 def test_other_versions_are_refused(tmp_path: Path, asset: object, message: str) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["asset"] = asset
     assert refused(file.save(tmp_path / "box.gltf")) == message
 
 
 def test_a_later_minor_version_is_read(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["asset"] = {"version": "2.1"}
     assert len(read_gltf(file.save(tmp_path / "box.glb")).parts) == 1
 
 
 def test_damaged_containers_are_refused(tmp_path: Path) -> None:
-    whole, path = File().shown().glb(), tmp_path / "box.glb"
+    whole, path = File().with_tetrahedron().glb(), tmp_path / "box.glb"
     for content, message in (
         (whole[:100], f"damaged: it has 100 bytes, but its header says {len(whole)}"),
         (whole[:4], "its version is 0"),
@@ -112,7 +112,7 @@ def test_folders_and_pipes_are_refused(tmp_path: Path) -> None:
 )
 def test_names_of_files_percent_encoded_or_not(tmp_path: Path, uri: str, name: str) -> None:
     (tmp_path / "here" / "sub").mkdir(parents=True)
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["buffers"] = [{"byteLength": len(file.data), "uri": uri}]
     path = file.save(tmp_path / "here" / "box.gltf")
     path.with_suffix(".bin").rename(path.parent / name)
@@ -121,14 +121,14 @@ def test_names_of_files_percent_encoded_or_not(tmp_path: Path, uri: str, name: s
 
 @pytest.mark.parametrize("head", ["data:application/octet-stream;base64,", "data:;base64,", "data:any/thing;base64,"])
 def test_data_uris_are_decoded(tmp_path: Path, head: str) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     text = base64.b64encode(bytes(file.data)).decode().rstrip("=").replace("+", "%2B")
     file.tree["buffers"] = [{"byteLength": len(file.data), "uri": head + text[:40] + "\n" + text[40:]}]
     assert read_gltf(file.save(tmp_path / "box.gltf")).parts[0].positions.tolist() == TETRAHEDRON.tolist()
 
 
 def test_missing_data_are_an_error_that_names_the_buffer(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     path = file.save(tmp_path / "box.gltf")
     os.mkfifo(tmp_path / "pipe")
     for uri, message in (
@@ -153,7 +153,7 @@ def test_a_missing_image_is_left_out_with_a_note(tmp_path: Path) -> None:
     (tmp_path / "my map.png").write_bytes(png())
     for uri in ("my%20map.png", "gone%20.png", "data:image/png;base64,??", "data:image/png;base64,"):
         number = file.add("textures", source=file.add("images", uri=uri))
-        file.shown(pbrMetallicRoughness={"baseColorTexture": {"index": number}})
+        file.with_tetrahedron(pbrMetallicRoughness={"baseColorTexture": {"index": number}})
     contents = read_gltf(file.save(tmp_path / "box.glb"))
     sources = [part.look.base_color_map and part.look.base_color_map.source for part in contents.parts]
     assert sources == [tmp_path / "my map.png", None, None, b""]
@@ -164,11 +164,11 @@ def test_a_missing_image_is_left_out_with_a_note(tmp_path: Path) -> None:
 
 
 def test_unused_buffers_may_be_missing(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["buffers"] = [{"byteLength": len(file.data)}, {"byteLength": 9, "uri": "none.bin"}]
     assert len(read_gltf(file.save(tmp_path / "box.glb")).parts) == 1
 
 
 def test_arrays_have_standard_types(tmp_path: Path) -> None:
-    part = read_gltf(File().shown().save(tmp_path / "box.glb")).parts[0]
+    part = read_gltf(File().with_tetrahedron().save(tmp_path / "box.glb")).parts[0]
     assert (part.positions.dtype, part.faces.dtype, part.uvs[0].dtype) == (np.float64, np.int64, np.float64)

@@ -20,7 +20,7 @@ def read(file: File, path: Path) -> Contents:
 
 
 def look(path: Path, **material: Any) -> Look:
-    return read(File().shown(**material), path).parts[0].look
+    return read(File().with_tetrahedron(**material), path).parts[0].look
 
 
 def refused(file: File, path: Path) -> str:
@@ -86,7 +86,7 @@ def test_each_loss_is_one_note_that_counts_materials(tmp_path: Path) -> None:
     file, lossy = File(), textured()
     shiny = {"metallicFactor": 1, "metallicRoughnessTexture": {"index": 0}, "baseColorFactor": [2, 0, 0, 1]}
     for _ in range(2):
-        lossy.shown(
+        lossy.with_tetrahedron(
             pbrMetallicRoughness=shiny,
             emissiveFactor=[0, 0.1, 0],
             occlusionTexture={"index": 0},
@@ -116,12 +116,12 @@ def test_each_loss_is_one_note_that_counts_materials(tmp_path: Path) -> None:
         "occlusion textures left out: used by 2 materials",
         "the colour of KHR_materials_specular left out: used by 2 materials",
     ]
-    file.shown(emissiveTexture={"index": 0}, extensions={"KHR_materials_variants": {}})
+    file.with_tetrahedron(emissiveTexture={"index": 0}, extensions={"KHR_materials_variants": {}})
     assert read(file, tmp_path).notes == (), "emission is black without its factor"
 
 
 def test_unused_materials_are_not_noted(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.add("materials", alphaMode="BLEND", normalTexture={"index": 9})
     assert read(file, tmp_path).notes == ()
 
@@ -129,7 +129,7 @@ def test_unused_materials_are_not_noted(tmp_path: Path) -> None:
 def test_specular_glossiness_gives_the_diffuse_colour(tmp_path: Path) -> None:
     file = textured()
     glossy = {"diffuseFactor": [0.5, 0.5, 0.25, 1], "diffuseTexture": {"index": 0}, "glossinessFactor": 0.5}
-    contents = read(file.shown(extensions={"KHR_materials_pbrSpecularGlossiness": glossy}), tmp_path)
+    contents = read(file.with_tetrahedron(extensions={"KHR_materials_pbrSpecularGlossiness": glossy}), tmp_path)
     result = contents.parts[0].look
     assert result.base_color == (0.5, 0.5, 0.25) and result.base_color_map is not None
     assert contents.notes == (
@@ -144,7 +144,7 @@ def test_images_of_textures_are_not_decoded(tmp_path: Path) -> None:
     file = textured(3)
     file.tree["images"][1]["name"] = "bumps"
     contents = read(
-        file.shown(
+        file.with_tetrahedron(
             pbrMetallicRoughness={"baseColorTexture": {"index": 0}},
             normalTexture={"index": 1, "scale": -0.5},
             extensions={"KHR_materials_specular": {"specularTexture": {"index": 2}}},
@@ -169,7 +169,7 @@ def test_images_of_textures_are_not_decoded(tmp_path: Path) -> None:
 def test_samplers(tmp_path: Path, sampler: dict[str, int], wrap: tuple[str, str], nearest: bool) -> None:
     file = textured(sampler=0)
     file.add("samplers", **sampler)
-    texture = read(file.shown(normalTexture={"index": 0}), tmp_path).parts[0].look.normal_map
+    texture = read(file.with_tetrahedron(normalTexture={"index": 0}), tmp_path).parts[0].look.normal_map
     assert texture is not None and (texture.wrap, texture.nearest) == (wrap, nearest)
 
 
@@ -177,7 +177,7 @@ def test_a_texture_transform_scales_rotates_and_shifts(tmp_path: Path) -> None:
     """As the specification defines, coordinates rotate counter-clockwise if v points down."""
     transform = {"scale": [2, 3], "rotation": math.pi / 2, "offset": [10, 20], "texCoord": 0}
     info = {"index": 0, "texCoord": 7, "extensions": {"KHR_texture_transform": transform}}
-    texture = read(textured().shown(normalTexture=info), tmp_path).parts[0].look.normal_map
+    texture = read(textured().with_tetrahedron(normalTexture=info), tmp_path).parts[0].look.normal_map
     assert texture is not None and texture.transform is not None and texture.coordinates == 0
     matrix = np.array(texture.transform)
     assert matrix @ (0, 0, 1) == pytest.approx((10, 20))
@@ -211,7 +211,7 @@ def test_images_in_formats_of_extensions(tmp_path: Path) -> None:
         start=2,
     ):
         file.add("textures", **texture)
-        file.shown(normalTexture={"index": number})
+        file.with_tetrahedron(normalTexture={"index": number})
     contents = read(file, tmp_path)
     maps = [part.look.normal_map for part in contents.parts]
     assert [texture and texture.name for texture in maps] == ["image 1", "image 0", "image 0", None, None]
@@ -267,14 +267,14 @@ def test_a_bad_material_is_named(tmp_path: Path, material: dict[str, Any], messa
     file.add("textures", source=0, sampler=9)
     file.add("textures", source=0, sampler=0)
     file.add("samplers", wrapS=5)
-    assert refused(file.shown(**material), tmp_path).startswith(message)
+    assert refused(file.with_tetrahedron(**material), tmp_path).startswith(message)
 
 
 # --- extensions ------------------------------------------------------------------------------------------------------
 
 
 def test_an_unknown_required_extension_is_refused_by_name(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["extensionsRequired"] = ["KHR_texture_transform", "VENDOR_unknown", "KHR_materials_clearcoat"]
     message = "it requires VENDOR_unknown, KHR_materials_clearcoat, which cannot be read"
     assert refused(file, tmp_path) == message
@@ -287,7 +287,7 @@ def test_an_unknown_required_extension_is_refused_by_name(tmp_path: Path) -> Non
 
 
 def test_optional_extensions_in_use_are_noted(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["extensionsUsed"] = ["VENDOR_a", "VENDOR_b", "VENDOR_c", "KHR_xmp_json_ld"]
     file.tree["extensions"] = {"VENDOR_a": {"extensions": {"VENDOR_b": {}}}, "KHR_xmp_json_ld": {}}
     file.tree["nodes"][0]["extensions"] = {"VENDOR_b": 1}

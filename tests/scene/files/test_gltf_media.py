@@ -28,7 +28,7 @@ def medium(extensions: dict[str, Any], notes: Notes | None = None) -> Medium | N
 
 
 def read(path: Path, file: File | None = None, **extensions: Any) -> Contents:
-    file = (file or File()).shown(
+    file = (file or File()).with_tetrahedron(
         pbrMetallicRoughness={"baseColorFactor": [0.2, 0.4, 0.8, 1]},
         extensions={VOLUME: WAX, OLD: {"multiscatterColor": COLOR}, **extensions},
     )
@@ -168,5 +168,5 @@ def test_the_map_with_the_larger_share_is_used(tmp_path: Path, share: float, nam
 
 
 def test_diffuse_transmission_without_a_medium_is_noted(tmp_path: Path) -> None:
-    file = File().shown(extensions={DIFFUSE: {"diffuseTransmissionFactor": 1}})
+    file = File().with_tetrahedron(extensions={DIFFUSE: {"diffuseTransmissionFactor": 1}})
     assert read_gltf(file.save(tmp_path / "leaf.glb")).notes == (f"{DIFFUSE} left out: used by 1 material",)

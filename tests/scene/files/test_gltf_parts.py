@@ -287,7 +287,7 @@ def test_a_bad_node_is_named(tmp_path: Path, nodes: Any, message: str) -> None:
     ],
 )
 def test_a_bad_scene_is_named(tmp_path: Path, fields: Any, message: str) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree |= fields
     assert refused(file, tmp_path) == message
 

@@ -184,7 +184,7 @@ def test_a_mesh_with_sparse_positions_is_animated(tmp_path: Path) -> None:
 
 
 def test_a_file_without_motion_has_no_rig(tmp_path: Path) -> None:
-    contents = read(File().shown(), tmp_path)
+    contents = read(File().with_tetrahedron(), tmp_path)
     assert contents.rig is None and contents.animations == {}
 
 

@@ -18,7 +18,7 @@ ABOUT_X = [-HALF, 0, 0, HALF]  # rotates -z to -y
 
 
 def lit(*lights: dict[str, Any], **node: Any) -> File:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.tree["extensions"] = {"KHR_lights_punctual": {"lights": list(lights)}}
     for number in range(len(lights)):
         file.node(extensions={"KHR_lights_punctual": {"light": number}}, **node)
@@ -85,7 +85,7 @@ def test_a_missing_light_is_an_error(tmp_path: Path) -> None:
 
 
 def test_cameras_look_along_minus_z_of_their_nodes(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.add("cameras", type="perspective", perspective={"yfov": 0.5, "znear": 0.01}, name="front")
     file.add("cameras", type="orthographic", orthographic={"xmag": 3, "ymag": 2, "znear": 0, "zfar": 9})
     file.node(camera=0, translation=[0, 0, 4])
@@ -101,7 +101,7 @@ def test_cameras_look_along_minus_z_of_their_nodes(tmp_path: Path) -> None:
 
 
 def test_cameras_that_see_nothing_are_noted(tmp_path: Path) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.add("cameras", type="perspective", perspective={"yfov": 0, "znear": 0.01})
     file.add("cameras", type="orthographic", orthographic={"xmag": 3, "ymag": 0})
     file.add("cameras", type="perspective", perspective={"yfov": 1})
@@ -122,7 +122,7 @@ def test_cameras_that_see_nothing_are_noted(tmp_path: Path) -> None:
     ],
 )
 def test_a_bad_camera_is_named(tmp_path: Path, camera: dict[str, Any], message: str) -> None:
-    file = File().shown()
+    file = File().with_tetrahedron()
     file.add("cameras", **camera)
     file.node(camera=0)
     assert refused(file, tmp_path).startswith(message)
