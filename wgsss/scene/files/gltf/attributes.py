@@ -35,11 +35,11 @@ class Attributes:
     def _decode(self, packed: Item) -> None:
         """Decode what Draco compresses. Without the decoder, leave it to the accessors if these have data, too."""
         if error := missing(DRACO):
-            position = self._document.at("accessor", self._accessors.get("POSITION"), self.where)
+            position = self._document.at("accessor", self._accessors.get("POSITION"), self.location)
             if not position.has("bufferView"):
                 raise self._primitive.error(error)
             return
-        data, _ = self._document.view(packed.get("bufferView"), packed.where)
+        data, _ = self._document.view(packed.get("bufferView"), packed.location)
         self._decoded, self._faces = decode_primitive(packed, data)
 
     @property

@@ -113,7 +113,7 @@ class Document:
 
     def _has_uncompressed(self, view: Item) -> bool:
         """Return whether the buffer of a compressed view also holds the uncompressed data."""
-        buffer = self.at("buffer", view.get("buffer"), view.where)
+        buffer = self.at("buffer", view.get("buffer"), view.location)
         marks = (buffer.extension(name) for name in compression.MESHOPT)
         if any(mark is not None and mark.flag("fallback", False) for mark in marks):
             return False
