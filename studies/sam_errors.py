@@ -11,11 +11,11 @@ import numpy as np
 from tqdm import trange
 
 from wgsss.bake.sam.form_factors import FormFactors
+from wgsss.bake.samples import vertex_samples
 from wgsss.frame import begin
 from wgsss.gpu import default_gpu
 from wgsss.graph import Graph
 from wgsss.methods.sam.method import SamTranslucency
-from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import converged, irradiance_at
 from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
 from wgsss.stage import Body, Stage
@@ -35,7 +35,7 @@ class Errors:
 
     def __init__(self, scene: Scene, receivers: int) -> None:
         self.stages = [Stage(default_gpu(), replace(scene, lights=(light,))) for light in (*SUNS, SKY)]
-        self.vertices = at_vertices(scene.objects[0].mesh)
+        self.vertices = vertex_samples(scene.objects[0].mesh)
         self.chosen, self.share = self._drawn(receivers)
         bodies = [stage.bodies[0] for stage in self.stages]
         self.truth = sums(bodies[0], [irradiance_at(body, self.vertices) for body in bodies], self.chosen)

@@ -17,9 +17,9 @@ import numpy as np
 from sam_errors import M_back, sums
 from tqdm import tqdm
 
+from wgsss.bake.samples import vertex_samples
 from wgsss.gpu import default_gpu
 from wgsss.methods.sam.method import SamTranslucency
-from wgsss.methods.sam.upload import at_vertices
 from wgsss.reference.convergence import irradiance_at
 from wgsss.scene import DirectionalLight, load_scene
 from wgsss.stage import Stage
@@ -46,7 +46,7 @@ def main(argv: list[str] | None = None) -> None:
     stage = Stage(default_gpu(), scene)
     body = stage.bodies[0]
     times = np.arange(round(args.rate * SECONDS) + 1) / args.rate
-    everywhere = at_vertices(body.mesh)
+    everywhere = vertex_samples(body.mesh)
     chosen = np.sort(np.random.default_rng(1).permutation(len(everywhere.face))[: args.receivers])
 
     def shine(time_s: float) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 from wgsss import frame as shared
 from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.point_tree import point_tree
+from wgsss.bake.samples import vertex_samples
 from wgsss.graph import Graph
 from wgsss.methods.sam import method as sam
 from wgsss.methods.sam.method import SamTranslucency
-from wgsss.methods.sam.upload import at_vertices
 from wgsss.scene import MATERIALS, DirectionalLight, Mesh, OrthographicCamera
 from wgsss.stage import Stage
 
@@ -59,7 +59,7 @@ def use_sender_map(monkeypatch, make):
 def light_at_vertices(stage: Stage) -> Any:
     """Return L_d (V, 3), W/m^2, at all vertices of the only object."""
     graph, body = Graph(stage.gpu), stage.bodies[0]
-    vertices = at_vertices(body.rest.mesh)
+    vertices = vertex_samples(body.rest.mesh)
     V = len(vertices.face)
     light = shared.irradiance_points(shared.begin(graph, stage, (8, 8)), body, body.points(vertices), V, vertices)
     graph.run(light)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from wgsss.scene.geometry import fibonacci_sphere
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, Light, PointLight, RectLight, SphereLight
 
 Array = npt.NDArray[Any]
@@ -171,12 +172,8 @@ def _half_sphere(light: SphereLight, centre: Array) -> tuple[Array, Array, float
 
 
 def _spiral(count: int, low: float) -> Array:
-    """Return points (count, 3) of the unit sphere from z = 1 to z = `low` on a Fibonacci spiral, with equal areas."""
-    i = np.arange(count) + 0.5
-    z = 1 - (1 - low) * i / count
-    phi = math.pi * (3 - math.sqrt(5)) * i
-    ring = np.sqrt(1 - z * z)
-    return np.stack([ring * np.cos(phi), ring * np.sin(phi), z], axis=1)
+    """Return the unit vectors (count, 3) of `fibonacci_sphere` with +z as the axis, down to z = `low`."""
+    return np.roll(fibonacci_sphere(count, low), 1, axis=1)
 
 
 def _ball(points: Array) -> tuple[Array, float]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wgsss.bake.samples import subdivided
+from wgsss.bake.samples import subdivided, vertex_samples
 from wgsss.gpu import Gpu
-from wgsss.scene import load_scene
+from wgsss.scene import Mesh, load_scene
 from wgsss.scene.shapes import sphere
 from wgsss.stage import Stage
 
@@ -57,3 +57,17 @@ def test_samples_move_with_the_surface(gpu: Gpu) -> None:
         np.testing.assert_allclose(np.linalg.norm(at.normal, axis=1), 1.0, rtol=1e-5)
         corners = mesh.positions[mesh.faces[samples.face]]
         np.testing.assert_allclose(at.position, np.einsum("nk,nkd->nd", samples.barycentric, corners), atol=1e-3)
+
+
+def test_vertices_as_samples_are_where_the_vertices_are() -> None:
+    ball = sphere(radius=10.0, vertices=100)
+    lonely = Mesh(np.append(ball.positions, [[50, 0, 0]], axis=0), ball.faces)
+    corners = lonely.positions[lonely.faces]
+    for samples, wanted in (
+        (vertex_samples(lonely), ball.positions),
+        (vertex_samples(lonely, np.array([7, 3])), ball.positions[[7, 3]]),
+    ):
+        x = np.einsum("nk,nkd->nd", samples.barycentric, corners[samples.face])
+        np.testing.assert_array_equal(x[: len(wanted)], wanted)
+        assert not samples.share.any()
+    assert len(vertex_samples(lonely).face) == len(lonely.positions), "a vertex without faces has a sample, too"

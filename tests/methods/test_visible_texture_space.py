@@ -15,7 +15,7 @@ from wgsss.errors import InputError
 from wgsss.graph import Graph
 from wgsss.methods import texture_space
 from wgsss.methods.texture_space import TextureSpace
-from wgsss.methods.visible_texture_space import VisibleTextureSpace, is_closed
+from wgsss.methods.visible_texture_space import VisibleTextureSpace
 from wgsss.optics import SKIN_GAUSSIANS
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer
@@ -286,16 +286,6 @@ def test_where_a_back_may_be_seen_nothing_is_culled(gpu):
             for m in (TextureSpace(map_size=128), VisibleTextureSpace(map_size=128, **only("culled")))
         )
         assert whole.aovs["M_front"].max() > 0.1 and some.pixels.tobytes() == whole.pixels.tobytes()
-
-
-def test_closed_means_that_faces_meet_and_are_outside():
-    ball = sphere(10.0, 300)
-    assert is_closed(ball) and is_closed(octahedron())
-    assert not is_closed(Mesh(ball.positions, ball.faces[:-1]))
-    assert not is_closed(Mesh(ball.positions, ball.faces[:, ::-1].copy()))
-    turned = ball.faces.copy()
-    turned[0] = turned[0, ::-1]
-    assert not is_closed(Mesh(ball.positions, turned))
 
 
 def test_switches_are_on_or_off():

@@ -42,6 +42,20 @@ def subdivided(mesh: Mesh, spacing: float) -> Samples:
     return Samples(np.concatenate(faces).astype(np.int32), np.concatenate(middles), np.concatenate(share))
 
 
+def vertex_samples(mesh: Mesh, vertices: Array | slice = slice(None)) -> Samples:
+    """Return vertices of a mesh as samples with share 0, by default all of them.
+
+    `vertices` are indices (N,). Each sample is a corner of one face at its vertex: where normals or texture coordinates
+    differ between the faces, it belongs to one side. A vertex without faces receives no light: its sample is at the
+    first corner of the mesh.
+    """
+    used, first = np.unique(mesh.faces, return_index=True)
+    corner = np.zeros(len(mesh.positions), np.int64)
+    corner[used] = first
+    corner = corner[vertices]
+    return Samples((corner // 3).astype(np.int32), np.eye(3)[corner % 3], np.zeros(len(corner)))
+
+
 def count(mesh: Mesh, spacing: float) -> int:
     """How many samples `subdivided` gives."""
     return int(np.square(_cuts(mesh, spacing)).sum())

@@ -13,6 +13,7 @@ from wgsss.bake.environment import divided
 from wgsss.bake.suns import solid_angles
 from wgsss.cache import cached
 from wgsss.scene import EnvironmentLight, Scene
+from wgsss.scene.geometry import cosine_directions, golden_azimuths
 
 Array = npt.NDArray[Any]
 
@@ -64,7 +65,8 @@ def _triangles(scene: Scene) -> tuple[Array, Array]:
 def _visible(caster: rays.Caster, sky: _Image | np.float32, x: Array, n: Array, lift: float, first: int) -> Array:
     """The share (N,) at points of which the first has the number `first`, which turns its directions."""
     n = n.astype(np.float64)
-    w = _about(n, _golden(np.arange(first, first + len(x))))
+    turn = golden_azimuths(np.arange(first, first + len(x)))
+    w = cosine_directions(n, golden_azimuths(np.arange(DIRECTIONS)) + turn[:, None])
     origins = x + lift * n
     if not isinstance(sky, _Image):
         weight = np.full(w.shape[:2], sky)
@@ -78,24 +80,6 @@ def _visible(caster: rays.Caster, sky: _Image | np.float32, x: Array, n: Array, 
     free = np.zeros(cast.shape, bool)
     free[cast] = ~caster.blocked(np.repeat(origins, cast.sum(axis=1), axis=0), w[cast])
     return ((free * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-30)).astype(np.float32)
-
-
-def _golden(numbers: Array) -> Array:
-    """Azimuths that fill the circle evenly, so that the error of neighbours differs instead of drawing bands."""
-    return 2.0 * np.pi * np.modf(numbers * 0.6180339887498949)[0]
-
-
-def _about(n: Array, turn: Array) -> Array:
-    """Directions (N, DIRECTIONS, 3) about normals (N, 3), as dense as the cosine, turned by the angles `turn` (N,)."""
-    i = np.arange(DIRECTIONS)
-    sine = np.sqrt((i + 0.5) / DIRECTIONS)
-    azimuth = _golden(i) + turn[:, None]
-    side = np.where(np.abs(n[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    u = np.cross(side, n)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(n, u)
-    across = (sine * np.cos(azimuth))[..., None] * u[:, None] + (sine * np.sin(azimuth))[..., None] * v[:, None]
-    return across + np.sqrt(1.0 - sine**2)[:, None] * n[:, None]
 
 
 class _Image:

@@ -19,6 +19,7 @@ from wgsss.bake import rays
 from wgsss.cache import cached
 from wgsss.optics import Profile
 from wgsss.optics.lookup import geometric
+from wgsss.scene.geometry import GOLDEN_ANGLE, cosine_directions
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -32,7 +33,6 @@ _NEAREST = 1e-4  # of the largest distance: the first entry
 _LIFT = 1e-5  # of the mesh's extent: how far below the surface rays start
 _BLOCK = 4096  # vertices whose rays are cast at a time
 _SMOOTHINGS = 2  # with one, ridges that are a triangle wide are drawn as zigzags
-_TURN = np.pi * (3.0 - np.sqrt(5.0))
 
 
 def local_thickness(mesh: Mesh, profile: Profile) -> Array:
@@ -83,7 +83,8 @@ def table(profile: Profile) -> tuple[Array, Array]:
 def far_side(caster: rays.Caster, mesh: Mesh, vertices: Array) -> Array:
     """How far away, mm, what each ray (N, RAYS) from `vertices` (N,) meets is; inf where that is not the far side."""
     n = mesh.normals[vertices].astype(np.float64)
-    w = _about(-n, _TURN * RAYS * vertices)
+    turn = GOLDEN_ANGLE * RAYS * vertices
+    w = cosine_directions(-n, GOLDEN_ANGLE * np.arange(RAYS) + turn[:, None])
     x = mesh.positions[vertices] - _LIFT * float(np.ptp(mesh.bounds, axis=0).max()) * n
     hit = caster.first(np.repeat(x, RAYS, axis=0), w.reshape(-1, 3)).reshape(len(x), RAYS)
     normal, corner = mesh.face_normals[hit], mesh.positions[mesh.faces[hit, 0]]
@@ -107,16 +108,3 @@ def smoothed(mesh: Mesh, values: Array) -> Array:
     for _ in range(_SMOOTHINGS):
         values = shares @ values / sums
     return values.astype(np.float32)
-
-
-def _about(n: Array, turn: Array) -> Array:
-    """Directions (N, RAYS, 3) about unit vectors n (N, 3), as dense as the cosine, turned by the angles `turn` (N,)."""
-    i = np.arange(RAYS)
-    sine = np.sqrt((i + 0.5) / RAYS)
-    azimuth = _TURN * i + turn[:, None]
-    side = np.where(np.abs(n[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    u = np.cross(side, n)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(n, u)
-    across = (sine * np.cos(azimuth))[..., None] * u[:, None] + (sine * np.sin(azimuth))[..., None] * v[:, None]
-    return across + np.sqrt(1.0 - sine**2)[:, None] * n[:, None]

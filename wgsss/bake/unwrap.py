@@ -13,6 +13,7 @@ from wgsss.bake.atlas import library, new_atlas
 from wgsss.cache import Arrays, cached
 from wgsss.gpu import Gpu
 from wgsss.graph import Graph
+from wgsss.scene.geometry import face_components
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -71,7 +72,7 @@ def _unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
     if atlas is None or not is_unique(gpu, mesh, atlas):
         atlas = new_atlas(mesh)
     render_mesh = _render_mesh(mesh, atlas)
-    charts = _components(atlas_vertices(render_mesh.vertex, render_mesh.atlas)[render_mesh.faces])
+    charts = face_components(atlas_vertices(render_mesh.vertex, render_mesh.atlas)[render_mesh.faces])
     return replace(render_mesh, charts=charts)
 
 
@@ -138,16 +139,3 @@ def _distinct(columns: list[Array]) -> tuple[Array, Array]:
     index = np.empty(len(rows), np.int64)
     index[order] = np.cumsum(new) - 1
     return order[new], index
-
-
-def _components(faces: Array) -> Array:
-    """int32 (F,): the connected component of each face, through the vertices that faces (F, 3) share."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = int(faces.max()) + 1
-    ends = faces[:, [0, 1]].reshape(-1, 2), faces[:, [1, 2]].reshape(-1, 2)
-    rows, columns = np.concatenate(ends).T
-    joined = coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
-    labels = connected_components(joined, directed=False)[1]
-    return np.unique(labels[faces[:, 0]], return_inverse=True)[1].astype(np.int32)

@@ -20,7 +20,7 @@ from wgsss.frame import Frame, irradiance_texels
 from wgsss.gpu import Buffer
 from wgsss.graph import Handle
 from wgsss.methods.texture_space import TextureSpace
-from wgsss.scene import Mesh
+from wgsss.scene.geometry import is_closed
 from wgsss.stage import Body, Stage
 
 Array = npt.NDArray[np.float64]
@@ -132,13 +132,3 @@ def hides_its_back(frame: Frame, body: Body) -> bool:
     eye = np.linalg.solve(posed.matrix, frame.view.eye)[:3]
     inside = frame.view.eye[3] == 1.0 and bool(((posed.mesh.bounds[0] <= eye) & (eye <= posed.mesh.bounds[1])).all())
     return not inside and body.stage.shared(("closed", id(body.rest.mesh)), lambda: is_closed(body.rest.mesh))
-
-
-def is_closed(mesh: Mesh) -> bool:
-    """Return whether each edge has two faces, which traverse it in opposite directions, and normals face outwards."""
-    ends = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
-    code = ends @ [len(mesh.positions), 1]
-    back = ends @ [1, len(mesh.positions)]
-    apart = mesh.positions[mesh.faces[:, 0]].astype(np.float64) - mesh.bounds.mean(axis=0)
-    volume = np.einsum("ij,ij->", apart, mesh.face_normals)
-    return len(np.unique(code)) == len(code) and np.array_equal(np.sort(code), np.sort(back)) and bool(volume > 0.0)

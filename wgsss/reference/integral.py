@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.samples import Samples
+from wgsss.bake.samples import Samples, vertex_samples
 from wgsss.cache import Arrays, cached
 from wgsss.errors import Note
 from wgsss.frame import Frame, begin
@@ -105,9 +105,8 @@ def at_vertices(
     profile = profile or body.material.profile
 
     def compute() -> Arrays:
-        used, first = np.unique(body.mesh.faces, return_index=True)
-        receivers = Samples((first // 3).astype(np.int32), np.eye(3)[first % 3], np.zeros(len(first)))
-        M = converged(body, receivers, profile, tolerance, samples)
+        used = np.unique(body.mesh.faces)
+        M = converged(body, vertex_samples(body.mesh, used), profile, tolerance, samples)
         front, back = np.zeros((2, len(body.mesh.positions), 3), np.float32)
         front[used], back[used] = M.front, M.back
         return {"front": front, "back": back, "notes": np.array([M.note], "U")}

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
+from wgsss.scene.geometry import rotate_about
 
 Matrix = npt.NDArray[np.float64]
 
@@ -48,11 +49,8 @@ class _Camera:
 
     def _turned(self, degrees: float) -> Self:
         """Rotate the eye about the axis `up` through the target, counter-clockwise seen from the tip of `up`."""
-        axis, angle = _unit(np.asarray(self.up)), math.radians(degrees)
-        arm = np.subtract(self.eye, self.target)
-        turned = arm * math.cos(angle) + np.cross(axis, arm) * math.sin(angle)
-        turned += axis * (axis @ arm) * (1 - math.cos(angle))
-        return replace(self, eye=tuple(self.target + turned))
+        arm = rotate_about(np.subtract(self.eye, self.target), _unit(np.asarray(self.up)), degrees)
+        return replace(self, eye=tuple(self.target + arm))
 
     @classmethod
     def orbit(cls, target: Triple, distance: float, azimuth: float, elevation: float, **rest: Any) -> Self:

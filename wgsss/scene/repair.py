@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.scene.geometry import components
+
 Array = npt.NDArray[Any]
 
 # Below this ratio of height to length, rounding of float32 positions decides which way a triangle faces.
@@ -116,17 +118,7 @@ class _Edges:
         if not len(self.boundary):
             return 0
         vertices, ends = np.unique(self.boundary, return_inverse=True)
-        return int(_components(len(vertices), *ends.reshape(-1, 2).T).max()) + 1
-
-
-def _components(count: int, start: Array, end: Array) -> Array:
-    """The connected component of each of `count` nodes joined by edges from `start` to `end`."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(count, count))
-    labels: Array = connected_components(graph, directed=False)[1]
-    return labels
+        return int(components(len(vertices), *ends.reshape(-1, 2).T).max()) + 1
 
 
 def _degenerate(positions: Array, faces: Array) -> Array:
@@ -158,7 +150,7 @@ def _disagreeing(edges: _Edges, positions: Array, faces: Array) -> Array:
         return np.zeros(count, bool)
     f, g = edges.pairs
     crossed = np.where(edges.agree, 0, count)
-    as_is, turned = _components(
+    as_is, turned = components(
         2 * count, np.concatenate([f, f + count]), np.concatenate([g + crossed, g + count - crossed])
     ).reshape(2, count)
     area = np.linalg.norm(_area_vectors(positions, faces), axis=1)
@@ -171,7 +163,7 @@ def _disagreeing(edges: _Edges, positions: Array, faces: Array) -> Array:
 
 def _inside_out(edges: _Edges, positions: Array, faces: Array) -> Array:
     """Return the faces of closed pieces that enclose a negative volume. Small holes are allowed; cavities stay."""
-    piece = _components(len(faces), *edges.pairs)
+    piece = components(len(faces), *edges.pairs)
     pieces = int(piece.max()) + 1
     corners = positions[faces].astype(np.float64)
     corner_piece = np.repeat(piece, 3)

@@ -19,6 +19,7 @@ from wgsss.bake.environment import summed
 from wgsss.errors import InputError
 from wgsss.optics import Profile
 from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
+from wgsss.scene.geometry import fibonacci_sphere
 from wgsss.scene.light import Light
 from wgsss.stage import Stage
 
@@ -144,10 +145,7 @@ def suns(skies: list[EnvironmentLight]) -> tuple[Array, Array]:
 
     Each sun has the light of all pixels that are nearest to it.
     """
-    i = np.arange(SUNS) + 0.5
-    y, phi = 1.0 - 2.0 * i / SUNS, math.pi * (3.0 - math.sqrt(5.0)) * i
-    ring = np.sqrt(1.0 - y * y)
-    towards = np.stack([ring * np.sin(phi), y, ring * np.cos(phi)], axis=1)
+    towards = fibonacci_sphere(SUNS)
     pixels = summed(skies).astype(np.float64)
     if (pixels == pixels[0, 0]).all():
         return towards, np.tile(4.0 * math.pi / SUNS * pixels[0, 0], (SUNS, 1))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from wgsss.bake.rays import Caster
 from wgsss.scene import Camera, DirectionalLight, EnvironmentLight, Light, Object, OrthographicCamera, Scene
+from wgsss.scene.geometry import rotate_about
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def orbit(camera: Camera, right: float, up: float) -> Camera:
     elevation = math.degrees(math.asin(np.clip(arm @ pole / np.linalg.norm(arm), -1.0, 1.0)))
     change = float(np.clip(elevation - DEGREES_PER_HEIGHT * up, -MAX_ELEVATION, MAX_ELEVATION)) - elevation
     across = _unit(np.cross(pole, arm))
-    arm = _rotate(_rotate(arm, across, -change), pole, -DEGREES_PER_HEIGHT * right)
+    arm = rotate_about(rotate_about(arm, across, -change), pole, -DEGREES_PER_HEIGHT * right)
     return replace(camera, eye=_triple(camera.target + arm))
 
 
@@ -77,7 +78,7 @@ def turn_light(light: Light, camera: Camera, right: float, up: float, centre: np
     return _rotate_light(
         light,
         centre,
-        lambda v: _rotate(_rotate(v, upright, DEGREES_PER_HEIGHT * right), across, -DEGREES_PER_HEIGHT * up),
+        lambda v: rotate_about(rotate_about(v, upright, DEGREES_PER_HEIGHT * right), across, -DEGREES_PER_HEIGHT * up),
     )
 
 
@@ -99,7 +100,9 @@ def aim_light(light: Light, centre: npt.ArrayLike, azimuth: float, elevation: fl
     old_azimuth, old_elevation = light_angles(light, centre)
     side = np.array([math.cos(math.radians(old_azimuth)), 0.0, -math.sin(math.radians(old_azimuth))])
     return _rotate_light(
-        light, centre, lambda v: _rotate(_rotate(v, side, old_elevation - elevation), _Y_AXIS, azimuth - old_azimuth)
+        light,
+        centre,
+        lambda v: rotate_about(rotate_about(v, side, old_elevation - elevation), _Y_AXIS, azimuth - old_azimuth),
     )
 
 
@@ -150,12 +153,6 @@ def _rotate_light(light: Any, centre: npt.ArrayLike, rotate: Callable[[Array], A
     if hasattr(light, "position"):
         changes["position"] = _triple(np.asarray(centre) + rotated(np.subtract(light.position, centre)))
     return replace(light, **changes)
-
-
-def _rotate(vector: Array, axis: Array, degrees: float) -> Array:
-    """Rotate a vector counter-clockwise as seen from the tip of a unit axis (Rodrigues)."""
-    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    return vector * cos + np.cross(axis, vector) * sin + axis * (axis @ vector) * (1.0 - cos)
 
 
 def _unit(vector: Array) -> Array:

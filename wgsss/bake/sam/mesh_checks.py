@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wgsss.scene.geometry import face_components, signed_volume
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -33,9 +34,9 @@ def topology_warning(mesh: Mesh) -> str:
     if inconsistent:
         edge_count = _counted(inconsistent, "edge")
         notes.append(f"{edge_count} without exactly two faces of the same winding: some normals may point inwards")
-    if not open_edges and _volume(mesh) < 0.0:
+    if not open_edges and signed_volume(mesh) < 0.0:
         notes.append("the normals point inwards: the outside of the object counts as its back side")
-    if (components := _component_count(mesh)) > 1:
+    if (components := int(face_components(mesh.faces).max()) + 1) > 1:
         notes.append(f"{components} separate components: light passes between them as if the gaps were filled")
     return "; ".join(notes)
 
@@ -43,20 +44,3 @@ def topology_warning(mesh: Mesh) -> str:
 def _counted(count: int, noun: str) -> str:
     """Return the count and the noun, in the plural for more than one."""
     return f"{count} {noun}{'s' if count > 1 else ''}"
-
-
-def _volume(mesh: Mesh) -> float:
-    """Return the signed volume that a closed mesh encloses, mm^3: negative where the faces are wound inwards."""
-    corner = mesh.positions[mesh.faces[:, 0]].astype(np.float64) - mesh.bounds.mean(axis=0)
-    return float(np.einsum("ij,ij->", corner, mesh.face_normals) / 6.0)
-
-
-def _component_count(mesh: Mesh) -> int:
-    """Return the number of connected components of the mesh, without vertices that have no faces."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    count = len(mesh.positions)
-    graph = coo_array((np.ones(len(start), np.int8), (start, end)), shape=(count, count))
-    return len(np.unique(connected_components(graph, directed=False)[1][mesh.faces[:, 0]]))

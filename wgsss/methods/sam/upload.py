@@ -13,7 +13,7 @@ from wgsss import wgsl
 from wgsss.bake.sam import SenderMap
 from wgsss.bake.sam.fans import fan_areas
 from wgsss.bake.sam.sender_map import ENTRY_BYTES, MIXTURE_BYTES, NeighbourMixture, SmoothedMeans
-from wgsss.bake.samples import Samples
+from wgsss.bake.samples import Samples, vertex_samples
 from wgsss.gpu import LIMITS, Buffer, Gpu
 from wgsss.scene import Mesh
 
@@ -101,10 +101,10 @@ def upload(gpu: Gpu, mesh: Mesh, faces: Array, sender_map: SenderMap, *, deforms
     if not len(rows):
         return None
     read = np.arange(sender_map.sender_count) if deforms else _senders_read(sender_map)
-    samples = at_vertices(mesh) if sender_map.sender_samples is None else sender_map.sender_samples
+    samples = vertex_samples(mesh) if sender_map.sender_samples is None else sender_map.sender_samples
     points = Samples(samples.face[read], samples.barycentric[read], samples.share[read])
     if deforms and sender_map.sender_samples is not None:
-        points = _concatenated(points, at_vertices(mesh))
+        points = _concatenated(points, vertex_samples(mesh))
     means = 0 if tree is None else len(tree.first)
     if sender_map.smoothed_means is not None and tree is not None:
         means = len(sender_map.smoothed_means.node)
@@ -134,18 +134,6 @@ def upload(gpu: Gpu, mesh: Mesh, faces: Array, sender_map: SenderMap, *, deforms
         ),
         None if sender_map.smoothed_means is None else _smoothed_means(gpu, sender_map.smoothed_means),
     )
-
-
-def at_vertices(mesh: Mesh) -> Samples:
-    """Return the V vertices of a mesh as samples of its surface.
-
-    A vertex is a corner of the first face that has it. If normals split it, it has the normal of that face's side. A
-    vertex without faces has no fan, so nothing reads it: it is put on the first face.
-    """
-    used, first = np.unique(mesh.faces, return_index=True)
-    corner = np.zeros(len(mesh.positions), np.int64)
-    corner[used] = first
-    return Samples((corner // 3).astype(np.int32), np.eye(3)[corner % 3], np.zeros(len(corner)))
 
 
 def _concatenated(first: Samples, second: Samples) -> Samples:

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from wgsss.scene.geometry import face_components
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes._implicit import spacing_for
 from wgsss.scene.shapes._relax import relax, vertex_normals
@@ -119,19 +120,13 @@ def _onto_cut(positions: np.ndarray, radius: float) -> np.ndarray:
 
 def _largest_piece(faces: np.ndarray) -> np.ndarray:
     """Return the faces of the largest connected piece, without faces at vertices that the rim passes twice."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     while True:
         rim = _rim(faces)
         visits = np.bincount(rim[:, 0], minlength=faces.max() + 1)
         if visits.max() < 2:
             break
         faces = faces[(visits[faces] < 2).all(axis=1)]
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    count = int(faces.max()) + 1
-    _, piece = connected_components(coo_array((np.ones(len(edges)), edges.T), shape=(count, count)), directed=False)
-    piece = piece[faces[:, 0]]
+    piece = face_components(faces)
     return faces[piece == np.argmax(np.bincount(piece))]
 
 

@@ -11,9 +11,9 @@ from wgsss.bake.sam.fit.training import (
     SUNS,
     UNIFORM_WEIGHT,
     compressed,
-    spiral,
     training_lights,
 )
+from wgsss.scene.geometry import fibonacci_sphere
 from wgsss.scene.mesh import Mesh
 from wgsss.scene.shapes import sphere
 
@@ -30,7 +30,7 @@ def two_balls() -> Mesh:
 def test_suns_cast_shadows():
     mesh = two_balls()
     n, small = mesh.normals, np.arange(len(mesh.positions)) < len(sphere(1.0, 100).positions)
-    towards = spiral(SUNS)
+    towards = fibonacci_sphere(SUNS)
     light = training_lights(mesh)[:SUNS]
     right, left = np.argmax(towards[:, 0]), np.argmin(towards[:, 0])
     assert not light[right][small].any()
@@ -45,13 +45,6 @@ def test_skies_and_uniform_light_reach_every_vertex():
     skies = lights[SUNS:-1] / SKY_WEIGHT
     assert skies.min() >= 0.0 and skies.max() <= 1.0 + 1e-6
     np.testing.assert_allclose(skies.mean(axis=0), 0.5, atol=0.02)  # half of every sky is above
-
-
-def test_directions_of_a_spiral_are_spread_evenly():
-    w = spiral(SUNS)
-    np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0)
-    np.testing.assert_allclose(w.T @ w / SUNS, np.eye(3) / 3, atol=0.01)
-    np.testing.assert_allclose(w.mean(axis=0), 0.0, atol=0.01)
 
 
 def test_compressed_lights_have_the_same_dot_products():

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake import rays
+from wgsss.scene.geometry import fibonacci_sphere
 from wgsss.scene.mesh import Mesh
 
 Array = npt.NDArray[Any]
@@ -37,12 +38,12 @@ def training_lights(mesh: Mesh) -> Array:
     x = mesh.positions + _LIFT * float(np.ptp(mesh.bounds, axis=0).max()) * n
     caster = rays.Caster(mesh.positions, mesh.faces)
     lights = np.zeros((SUNS + SKIES + 1, len(n)), np.float32)
-    for light, w in zip(lights, spiral(SUNS), strict=False):
+    for light, w in zip(lights, fibonacci_sphere(SUNS), strict=False):
         cosine = n @ w
         lit = np.flatnonzero(cosine > 0.0)
         is_visible = ~caster.blocked(x[lit], np.broadcast_to(w, (len(lit), 3)))
         light[lit] = cosine[lit] * is_visible
-    lights[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + spiral(SKIES) @ n.T)
+    lights[SUNS:-1] = SKY_WEIGHT * 0.5 * (1.0 + fibonacci_sphere(SKIES) @ n.T)
     lights[-1] = UNIFORM_WEIGHT
     return lights
 
@@ -64,11 +65,3 @@ def compressed(lights: Array, area: Array) -> Array:
     _, directions = np.linalg.eigh(gram)
     basis = directions[:, ::-1][:, :COMPONENTS].astype(np.float32)
     return lights.T @ basis
-
-
-def spiral(count: int) -> Array:
-    """Return unit vectors (count, 3), spread evenly over the sphere along a spiral."""
-    i = np.arange(count) + 0.5
-    y, around = 1.0 - 2.0 * i / count, np.pi * (3.0 - np.sqrt(5.0)) * i
-    ring = np.sqrt(1.0 - y * y)
-    return np.stack([ring * np.sin(around), y, ring * np.cos(around)], axis=1)

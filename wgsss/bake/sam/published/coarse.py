@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from wgsss.bake.sam.published.top import largest_form_factors
 from wgsss.bake.sam.sender_map import SenderMap
-from wgsss.bake.samples import Samples
+from wgsss.bake.samples import Samples, vertex_samples
 from wgsss.gpu import Gpu
 from wgsss.optics import Profile
 from wgsss.scene.mesh import Mesh
@@ -73,11 +73,10 @@ def _sender_samples(mesh: Mesh, simple: Mesh) -> Samples:
     """Return, for each vertex of the simplified mesh, a vertex of the mesh that is near and faces the same way."""
     from scipy.spatial import KDTree
 
-    used, first = np.unique(mesh.faces, return_index=True)
+    used = np.unique(mesh.faces)
     near = min(_NEAR, len(used))
     distance, index = KDTree(mesh.positions[used]).query(simple.positions, k=[*range(1, near + 1)])
     turned = 1.0 - np.einsum("sk,sjk->sj", simple.normals, mesh.normals[used[index]])
     width = np.sqrt(simple.area / len(simple.positions))
     chosen = np.argmin(np.square(distance) + np.square(width) * turned, axis=1)
-    corner = first[index[np.arange(len(index)), chosen]]
-    return Samples((corner // 3).astype(np.int32), np.eye(3)[corner % 3], np.zeros(len(corner)))
+    return vertex_samples(mesh, used[index[np.arange(len(index)), chosen]])
