@@ -65,7 +65,7 @@ def test_a_material_with_layers(tmp_path: Path, capsys):
     assert "two, layer 2: eta 1.4, without end" in out and "photons" in out and "standard error" in out
     path.write_text(layer + layer)
     _, err = run(capsys, str(path), code=2)
-    assert "material 'two': layer 1 has no end" in err
+    assert "material 'two': layer 1 is infinitely thick" in err
 
 
 def test_layers_too_thin_for_diffusion_are_for_photons_only(tmp_path: Path, capsys):

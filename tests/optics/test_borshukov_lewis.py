@@ -22,7 +22,7 @@ def test_reflectance_is_the_power_of_equation_45(profile):
 
 
 def test_reflectance_at_the_entry_by_hand():
-    """k = 4: the plane integral of (1 + r)^-4 is pi / 3."""
+    """For k = 4 the integral of (1 + r)^-4 over the plane is pi / 3."""
     np.testing.assert_allclose(BorshukovLewis((1, 1, 1), (4, 4, 4), (1, 2, 3)).reflectance(0.0) * [1, 4, 9], 3 / np.pi)
 
 
@@ -33,7 +33,7 @@ def test_closed_forms_are_the_integrals_of_reflectance(profile):
     np.testing.assert_allclose(profile.beyond(profile.range(0.02)).diagonal(), 0.02, rtol=1e-10)
 
 
-def test_line_spread_holds_the_total():
+def test_the_integral_of_the_line_spread_is_the_total():
     x = np.geomspace(1e-5, 1e4, 400)
     along = x[:, None] * BorshukovLewis((0.9, 0.5, 0.1), (5, 6, 7), (1, 1, 1)).line_spread(x)
     np.testing.assert_allclose(2 * along.sum(axis=0) * np.log(x[1] / x[0]), [0.9, 0.5, 0.1], rtol=1e-4)
@@ -47,7 +47,7 @@ def test_fit_to_each_measured_material(measured):
 
 
 def test_no_other_fit_is_better(skin):
-    """By simplex, from elsewhere, with the integrals of eq. 2 as plain sums over r."""
+    """Minimise by a simplex from another start, with the integrals of eq. 2 as plain sums over r."""
     r = np.arange(0.0005, 60, 0.001)
     wanted = skin.reflectance(r)[:, 0]
     total = skin.total[0]
@@ -65,14 +65,14 @@ def test_no_other_fit_is_better(skin):
     assert fit_error(skin, fit)[0] == pytest.approx(np.sqrt(best.fun), rel=1e-5)
 
 
-def test_its_own_profile_is_found_again(profile):
+def test_the_fit_of_such_a_profile_is_that_profile(profile):
     fit = BorshukovLewis.fit(profile)
     np.testing.assert_allclose(fit.k, K, rtol=1e-4)
     np.testing.assert_allclose(fit.c, C, rtol=1e-4)
 
 
 def test_fit_to_other_profiles():
-    """Without end at r = 0; without a tail; tiny; black."""
+    """Fit profiles that are infinite at r = 0, without a tail, tiny, or black."""
     burley = NormalizedDiffusion((0.9, 0.4, 0.1), (2, 0.5, 1e-4))
     assert np.all(fit_error(burley, BorshukovLewis.fit(burley)) < 0.25)
     narrow = SumOfGaussians([1e-12], [[0.5, 0.0, 2.0]])
@@ -108,12 +108,12 @@ def test_channels_are_independent(profile, skin):
         (T, 3.0, C, "k must be three numbers"),
     ],
 )
-def test_bad_input_is_told(albedo, k, c, says):
+def test_bad_input_raises_an_error(albedo, k, c, says):
     with pytest.raises(InputError, match=says):
         BorshukovLewis(albedo, k, c)
 
 
-def test_bad_distances_are_told(profile):
+def test_bad_distances_raise_an_error(profile):
     for name in ("reflectance", "beyond"):
         with pytest.raises(InputError, match="distances must be at least 0"):
             getattr(profile, name)(-1.0)

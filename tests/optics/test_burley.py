@@ -15,7 +15,7 @@ def profile():
     return NormalizedDiffusion(A, D)
 
 
-def test_share_within_sixteen_d_is_that_of_cycles(profile):
+def test_the_share_within_sixteen_d_is_that_of_cycles(profile):
     np.testing.assert_allclose(profile.enclosed(16 * D).diagonal(), 0.9963790093708328, rtol=1e-14)
 
 
@@ -43,7 +43,7 @@ def test_closed_forms_are_the_integrals_of_reflectance(profile):
 
 @pytest.mark.parametrize(
     ("fit", "s"),
-    [  # worked out by hand for the albedos 0.8, 0.5 and 0.33
+    [  # computed by hand for the albedos 0.8, 0.5 and 0.33
         (NormalizedDiffusion.searchlight, (1.05, 1.539, 2.246761)),
         (NormalizedDiffusion.diffuse, (1.1, 1.715, 2.34315)),
         (NormalizedDiffusion.from_diffuse_mean_free_path, (8.37968100, 3.58352100, 3.5)),
@@ -57,7 +57,7 @@ def test_d_is_the_length_over_the_fitted_s(fit, s):
 
 @pytest.mark.parametrize("fit", ["searchlight", "diffuse", "from_diffuse_mean_free_path"])
 def test_range_is_near_that_of_the_dipole(fit):
-    """Both model the same half space without reflection inside, but the dipole misses what scatters only once."""
+    """Both model a half space without internal reflection, but the dipole leaves out single scattering."""
     dipole = Dipole.from_reflectance((0.4, 0.6, 0.8), eta=1.0, mean_free_path=(1.0, 0.3, 0.1))
     length = 1 / dipole.sigma_tr if fit == "from_diffuse_mean_free_path" else dipole.mean_free_path
     ratio = getattr(NormalizedDiffusion, fit)(dipole.total, length).range(0.1) / dipole.range(0.1)
@@ -97,12 +97,12 @@ def test_black_reflects_nothing():
     ],
 )
 @pytest.mark.parametrize("name", ["", "searchlight", "diffuse", "from_diffuse_mean_free_path"])
-def test_bad_input_is_told(name, arguments, says):
+def test_bad_input_raises_an_error(name, arguments, says):
     with pytest.raises(InputError, match=says):
         (getattr(NormalizedDiffusion, name) if name else NormalizedDiffusion)(*arguments)
 
 
-def test_bad_distances_are_told(profile):
+def test_bad_distances_raise_an_error(profile):
     for name in ("reflectance", "beyond"):
         with pytest.raises(InputError, match="distances must be at least 0"):
             getattr(profile, name)(-1.0)

@@ -40,21 +40,21 @@ def test_total_is_the_integral_over_the_plane(measured, model):
             r = np.exp(log_r)
             return 2 * np.pi * profile.reflectance(r)[channel] * r * r
 
-        # Without absorption a share (z_r + z_v) / 2r lies beyond r, here 1e-10: as far as the bar reaches.
+        # Without absorption, a share (z_r + z_v) / 2r lies beyond r: 1e-10 here, as small as the tolerance.
         pieces = np.linspace(np.log(1e-7), np.log(1e10), 12)
         total = sum(quad(ring, a, b, epsabs=1e-12, epsrel=1e-11)[0] for a, b in pairwise(pieces))
         assert total == pytest.approx(profile.total[channel], abs=1e-9)
 
 
 def test_totals_are_the_published_reflectances():
-    """Jensen et al. 2001, figure 5, to within 0.008, but for chicken1's blue, which is not that of its coefficients."""
+    """Jensen et al. 2001, figure 5, within 0.008. The blue of chicken1 there does not fit its coefficients."""
     for name, published in PUBLISHED.items():
         off = np.abs(MATERIALS[name].profile.total - published)
         assert np.all(off < (0.008, 0.008, 0.03 if name == "chicken1" else 0.008)), (name, off)
 
 
 def test_reflectance_is_the_flux_of_two_sources_through_the_surface(skin):
-    """004 eq. 29 and 26: R = D dphi/dn, here from the fluence by central differences."""
+    """Mikkelsen 2009, eq. 29 and 26: R = D dphi/dn, here from the fluence by central differences."""
     diffusion = 1 / (3 * skin.sigma_t_prime)
     z_r = 1 / skin.sigma_t_prime
     z_b = 2 * boundary(skin.eta) * diffusion
@@ -78,7 +78,7 @@ def test_range_of_skin1_is_that_of_equation_40(skin):
 
 
 def test_range_without_absorption_is_algebraic():
-    """Beyond r a share (z_r + z_v) / 2r is left, to first order: 24 mm for Spectralon's red."""
+    """To first order, a share (z_r + z_v) / 2r of the light leaves beyond r: 24 mm for the red of Spectralon."""
     spectralon = Dipole((0, 0, 0), (11.6, 20.4, 14.9), 1.3)
     z_v = spectralon.mean_free_path * (1 + 4 / 3 * boundary(1.3))
     np.testing.assert_allclose(spectralon.range(1e-4), (spectralon.mean_free_path + z_v) / 2e-4, rtol=1e-6)
@@ -100,7 +100,7 @@ def test_better_dipole_without_absorption_returns_everything():
 
 
 def test_better_dipole_total_is_the_closed_form():
-    """The integral of d'Eon's R, written out."""
+    """The integral of d'Eon's R in closed form."""
     sigma_a, sigma_s_prime, eta = np.array([0.032, 0.17, 0.48]), np.array([0.74, 0.88, 1.01]), 1.3
     sigma_t_prime = sigma_a + sigma_s_prime
     D = (2 * sigma_a + sigma_s_prime) / (3 * sigma_t_prime**2)
@@ -121,7 +121,7 @@ def test_moments_are_those_of_fresnel(eta, first, second):
 
 
 @pytest.mark.parametrize("model", [Dipole, BetterDipole])
-def test_inversion_finds_the_medium_again(model):
+def test_from_reflectance_inverts_the_total(model):
     medium = model((0.0021, 0.17, 0.48), (2.19, 0.88, 1.01), 1.5)
     for name, length in (("mean_free_path", 1 / medium.sigma_t_prime), ("diffuse_mean_free_path", 1 / medium.sigma_tr)):
         found = model.from_reflectance(medium.total, eta=1.5, **{name: length})
@@ -149,16 +149,16 @@ def test_inversion_of_the_published_reflectance_of_marble():
             {"reflectance": (0.5, 0.5, 0.5), "mean_free_path": (0, 1, 1)},
             r"mean_free_path of red must be from 1e-06 to 1e\+06 \(mm\)",
         ),
-        ({"reflectance": (0.5, 0.5, 0.5)}, "one of them"),
-        ({"reflectance": (0.5, 0.5, 0.5), "radius": (1, 1, 1)}, "one of them"),
+        ({"reflectance": (0.5, 0.5, 0.5)}, "give one length"),
+        ({"reflectance": (0.5, 0.5, 0.5), "radius": (1, 1, 1)}, "give one length"),
     ],
 )
-def test_bad_inversions_are_told(arguments, says):
+def test_bad_inversions_raise_an_error(arguments, says):
     with pytest.raises(InputError, match=says):
         Dipole.from_reflectance(**arguments)
 
 
-def test_bad_distances_are_told(skin):
+def test_bad_distances_raise_an_error(skin):
     for r in (-1.0, [0.1, np.nan]):
         with pytest.raises(InputError, match="distances must be at least 0"):
             skin.reflectance(r)
@@ -204,6 +204,6 @@ def test_diffuse_fresnel_is_the_average_of_fresnel(eta, exact):
         ((1, 1, 1), (1, 1, 1), np.nan, "eta"),
     ],
 )
-def test_bad_input_is_told(sigma_a, sigma_s_prime, eta, says):
+def test_bad_input_raises_an_error(sigma_a, sigma_s_prime, eta, says):
     with pytest.raises(InputError, match=says):
         Dipole(sigma_a, sigma_s_prime, eta)

@@ -24,7 +24,7 @@ FITS = pytest.mark.parametrize("fit", [fit_gaussians, fit_shared_gaussians])
 
 
 class Opaque:
-    """A profile that does not say that it is a sum of Gaussians."""
+    """A profile whose class is not SumOfGaussians, so that fits cannot return it unchanged."""
 
     def __init__(self, profile):
         self.total, self.reflectance = profile.total, profile.reflectance
@@ -44,7 +44,7 @@ def test_error_falls_with_the_number_of_gaussians(measured, fit):
     assert np.all(np.diff(errors) < 0)
 
 
-def test_error_is_the_root_of_the_energy_ratio(skin):
+def test_the_error_is_the_root_of_the_energy_ratio(skin):
     fit = fit_shared_gaussians(skin, 4)
 
     def energy(f):
@@ -55,7 +55,7 @@ def test_error_is_the_root_of_the_energy_ratio(skin):
 
 
 def test_no_other_weights_are_better(measured):
-    """At the variances found, against Lawson and Hanson's solver with the total as one heavy row."""
+    """Compare with Lawson and Hanson's solver at the fitted variances, with the total as one heavy row."""
     profile = measured.dipole
     fit = fit_shared_gaussians(profile)
     r = np.geomspace(1e-4, 1e4, 1500)
@@ -71,7 +71,7 @@ def test_no_other_weights_are_better(measured):
 
 @pytest.mark.parametrize("total", [None, 0.1, 5.0])
 def test_weights_are_the_least_squares_of_lawson_and_hanson(total):
-    """Among so many random problems are some that want a weight back which was 0 on the way."""
+    """In some of so many random problems, a weight that was set to 0 becomes positive again."""
     rng = np.random.default_rng(2)
     for _ in range(500):
         basis, wanted = rng.standard_normal((12, 6)) + 2 * rng.random(), rng.standard_normal(12) + 0.5
@@ -81,18 +81,18 @@ def test_weights_are_the_least_squares_of_lawson_and_hanson(total):
         np.testing.assert_allclose(found, nnls(basis, wanted)[0], atol=1e-6)
 
 
-def test_no_near_variances_are_better(skin):
-    """A push of any variance by 1 %, with the weights as they are, brings nothing to first order."""
+def test_a_change_of_a_variance_does_not_reduce_the_error(skin):
+    """Change each variance by 1 % and keep the weights: to first order the error stays."""
     fit = fit_shared_gaussians(skin)
     best = np.square(fit_error(skin, fit)).sum()
     for k in range(6):
-        for push in (0.99, 1.01):
+        for factor in (0.99, 1.01):
             variances = fit.variances.copy()
-            variances[k] *= push
+            variances[k] *= factor
             assert np.square(fit_error(skin, SumOfGaussians(variances, fit.weights))).sum() > best * 0.999
 
 
-def test_a_sum_of_gaussians_is_found_again():
+def test_the_fit_of_a_sum_of_gaussians_is_that_sum():
     assert fit_shared_gaussians(SKIN_GAUSSIANS) is SKIN_GAUSSIANS
     two = SumOfGaussians([0.2, 3.0], [[0.5, 0.2, 0.0], [0.1, 0.2, 0.3]])
     fit = fit_shared_gaussians(Opaque(two), 2)
@@ -101,7 +101,7 @@ def test_a_sum_of_gaussians_is_found_again():
 
 
 @FITS
-def test_same_bits_each_time(skin, fit):
+def test_a_fit_has_the_same_bits_each_time(skin, fit):
     first, second = fit(skin), fit(skin)
     assert first.variances.tobytes() == second.variances.tobytes()
     assert first.weights.tobytes() == second.weights.tobytes()
@@ -141,12 +141,12 @@ def test_black_channels_stay_black(fit):
 
 
 @FITS
-def test_no_gaussians_is_told(skin, fit):
-    with pytest.raises(InputError, match="at least one"):
+def test_a_fit_of_no_gaussians_raises_an_error(skin, fit):
+    with pytest.raises(InputError, match="at least 1"):
         fit(skin, 0)
 
 
-# Each channel by itself, its energy left free.
+# Fits of each channel alone, with a free total.
 
 
 @pytest.mark.parametrize(("k", "percent"), [(2, 9.9), (3, 3.7), (4, 1.53), (6, 0.33)])
@@ -156,7 +156,7 @@ def test_worst_error_of_the_measured_materials(k, percent):
 
 
 def test_errors_of_four_gaussians_are_the_published_ones():
-    """003 below eq. 2: between 1.52 and 0.0793 percent. Only two channels of ketchup, nearly black, fall below."""
+    """Jimenez & Gutierrez 2008, below eq. 2: 0.0793 to 1.52 percent. Two nearly black channels are lower."""
     errors = {name: 100 * fit_error(profile, fit_gaussians(profile, 4)) for name, profile in MEASURED.items()}
     np.testing.assert_allclose(errors["spectralon"], 1.5225, atol=5e-5)
     assert errors["chicken2"][2] == pytest.approx(0.0794, abs=5e-5)
@@ -166,14 +166,14 @@ def test_errors_of_four_gaussians_are_the_published_ones():
 
 
 def test_light_that_four_gaussians_lose():
-    """As far as eq. 2 cares, a white medium's tail may go."""
+    """The error of eq. 2 hardly depends on the tail, which holds much of the light of a white medium."""
     white = MEASURED["spectralon"]
     np.testing.assert_allclose(fit_gaussians(white, 4).total, 1 - 0.1242, atol=1e-3)
 
 
 @pytest.mark.parametrize("k", [1, 3, 6])
-def test_no_other_start_ends_lower(skin, k):
-    """Variances by scipy's least squares from random starts, with the weights by Lawson and Hanson at each step."""
+def test_no_other_start_leads_to_a_smaller_error(skin, k):
+    """Fit variances by scipy's least squares from random starts, with Lawson and Hanson's weights at each step."""
     r = np.geomspace(1e-4, 1e3, 250)
     root = r * np.sqrt(np.log(r[1] / r[0]))
     wanted = root * skin.reflectance(r)[:, 0]
@@ -191,14 +191,14 @@ def test_no_other_start_ends_lower(skin, k):
     assert fit_error(skin, fit_gaussians(skin, k))[0] == pytest.approx(np.sqrt(2 * best), rel=1e-4)
 
 
-def test_channels_are_fitted_alone(skin):
+def test_channels_are_fitted_independently(skin):
     fit = fit_gaussians(skin, 4)
     turned = fit_gaussians(Dipole(skin.sigma_a[[2, 0, 1]], skin.sigma_s_prime[[2, 0, 1]], skin.eta), 4)
     np.testing.assert_array_equal(turned.variances, fit.variances[:, [2, 0, 1]])
     np.testing.assert_array_equal(turned.weights, fit.weights[:, [2, 0, 1]])
 
 
-def test_a_sum_of_gaussians_is_found_again_in_each_channel():
+def test_the_fit_of_a_sum_of_gaussians_is_that_sum_in_each_channel():
     shared = fit_gaussians(SKIN_GAUSSIANS)
     np.testing.assert_array_equal(shared.variances, np.repeat(SKIN_GAUSSIANS.variances[:, None], 3, axis=1))
     np.testing.assert_array_equal(shared.weights, SKIN_GAUSSIANS.weights)
@@ -209,7 +209,7 @@ def test_a_sum_of_gaussians_is_found_again_in_each_channel():
     np.testing.assert_allclose(fit.weights, two.weights, atol=1e-6)
 
 
-def test_blurs_get_shared_variances_of_any_sum():
+def test_a_sum_with_variances_per_channel_can_be_fitted_by_a_shared_one():
     own = SumOfGaussians([[0.2, 0.1, 1.0], [3.0, 4.0, 5.0]], [[0.5, 0.2, 0.7], [0.1, 0.2, 0.3]])
     fit = fit_shared_gaussians(own)
     assert fit.variances.ndim == 1
@@ -218,15 +218,15 @@ def test_blurs_get_shared_variances_of_any_sum():
 
 
 def test_channels_may_need_different_numbers_of_gaussians():
-    """Where one is enough for a channel, its others weigh nothing."""
+    """A channel that needs one Gaussian gives the others the weight 0."""
     three = SumOfGaussians([0.01, 1.0, 100.0], [[0.3, 0.0, 0.0], [0.3, 0.5, 0.0], [0.3, 0.0, 0.5]])
     fit = fit_gaussians(Opaque(three), 3)
     assert np.all(fit_error(three, fit) < 1e-6)
     np.testing.assert_allclose(fit.total, three.total, rtol=1e-6)
 
 
-def test_a_profile_without_end_at_zero_gets_gaussians_one_can_see():
-    """Level, at R of that distance, where Burley's has let out a hundredth of its light: at 0.02 d."""
+def test_a_profile_that_is_infinite_at_zero_gets_gaussians_of_visible_width():
+    """R is taken as constant within 0.02 d, the radius that encloses a hundredth of the light of this profile."""
     burley = NormalizedDiffusion((0.9, 0.4, 0.1), (2.0, 0.5, 1e-4))
     fit = fit_gaussians(burley)
     assert np.all(fit_error(burley, fit) < 0.04)
@@ -236,8 +236,8 @@ def test_a_profile_without_end_at_zero_gets_gaussians_one_can_see():
 
 
 @FITS
-def test_a_noisy_histogram_is_fitted_to_its_noise(skin, fit):
-    """Photons in bins, most of them empty far out."""
+def test_the_fit_of_a_noisy_histogram_is_near_the_profile(skin, fit):
+    """Count photons in bins. Most bins far from the entry are empty."""
     edges = np.linspace(0, 20, 401)
     share = skin.beyond(edges[:-1]) - skin.beyond(edges[1:])
     area = np.pi * np.diff(np.square(edges))

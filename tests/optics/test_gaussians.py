@@ -8,7 +8,7 @@ from wgsss.errors import InputError
 from wgsss.optics import SKIN_GAUSSIANS, Profile, SumOfGaussians
 
 OWN = SumOfGaussians(
-    [[0.01, 0.2, 0.3], [1.0, 0.2, 5.0]],  # green needs but one
+    [[0.01, 0.2, 0.3], [1.0, 0.2, 5.0]],  # green needs one Gaussian only
     [[0.2, 0.5, 0.0], [0.3, 0.0, 0.4]],
 )
 EACH = pytest.mark.parametrize("profile", [SKIN_GAUSSIANS, OWN], ids=["shared", "own"])
@@ -35,7 +35,7 @@ def test_total_is_the_integral_over_the_plane():
         assert total == pytest.approx(1.0, abs=1e-9)
 
 
-def test_own_variances_are_a_sum_of_each_channel():
+def test_variances_per_channel_give_a_sum_for_each_channel():
     r, x = np.array([[0.0, 0.1], [1.0, 5.0]]), np.array([-2.0, 0.0, 0.3])
     for c in range(3):
         alone = SumOfGaussians(OWN.variances[:, c] * [1, 1 + 1e-15], np.repeat(OWN.weights[:, [c]], 3, axis=1))
@@ -73,7 +73,7 @@ def test_channels_are_independent(profile):
 
 
 def test_step_response_is_the_convolution_with_a_half_plane():
-    """A ring of radius r about x lies within the lit side by a share arccos(-x / r) / pi."""
+    """A share arccos(-x / r) / pi of a ring of radius r about x is on the lit side."""
     for x in (-2.0, -0.3, -0.02, 0.0, 0.1, 1.5):
         for channel in range(3):
 
@@ -92,7 +92,7 @@ def test_halving_lengths_scales_reflectance_by_four(profile):
     np.testing.assert_allclose(half.reflectance(r / 2), 4 * profile.reflectance(r), rtol=1e-12)
 
 
-def test_bad_distances_are_told():
+def test_bad_distances_raise_an_error():
     for name in ("reflectance", "beyond"):
         with pytest.raises(InputError, match="distances must be at least 0"):
             getattr(OWN, name)(-1.0)
@@ -116,7 +116,7 @@ def test_bad_distances_are_told():
         ([1.0], [[1.0, np.inf, 1.0]], "sum to 100 at most"),
     ],
 )
-def test_bad_input_is_told(variances, weights, says):
+def test_bad_input_raises_an_error(variances, weights, says):
     with pytest.raises(InputError, match=says):
         SumOfGaussians(np.array(variances), np.array(weights))
 

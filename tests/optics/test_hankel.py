@@ -11,7 +11,7 @@ DEPTHS = np.array([0.7, 1.0, 4.5])  # mm, one for each channel
 
 
 def depth_spectrum(sigma_tr):
-    """The transform of a source's flux through a plane at DEPTHS from it, times two."""
+    """Return twice the transform of the flux of a source through a plane at DEPTHS from it."""
     return lambda k: np.exp(-DEPTHS * np.sqrt(sigma_tr**2 + np.square(np.asarray(k))[..., None]))
 
 
@@ -26,7 +26,7 @@ def test_sources_without_absorption():
 
 @pytest.mark.parametrize("sigma_tr", [0.01, 0.3, 1.7])
 def test_sources_with_absorption(sigma_tr):
-    """To 1e-13 of the total, spread over the circle: rounding, where exp(-sigma_tr r) is less."""
+    """The error is 1e-13 of the total, spread over the circle: rounding dominates where exp(-sigma_tr r) is smaller."""
     spectrum, r = depth_spectrum(sigma_tr), R[:, None]
     d = np.hypot(r, DEPTHS)
     total = np.exp(-sigma_tr * DEPTHS)
@@ -42,7 +42,7 @@ def test_sources_with_absorption(sigma_tr):
 
 
 def test_modes_of_slabs():
-    """1 / (k^2 + s^2) has its pole on the imaginary axis, and falls off slowly."""
+    """The transform 1 / (k^2 + s^2) has its pole on the imaginary axis, and falls off slowly."""
     s = np.array([0.05, 1.0, 20.0])
     r = np.geomspace(1e-2, 10.0, 20)[:, None]
 
@@ -58,7 +58,7 @@ def test_modes_of_slabs():
 
 
 def test_thick_absorbing_slabs():
-    """What passes them has a transform that is nearly a Gaussian: exp(-z q), sigma_tr z = 90, over a distance z."""
+    """The light that passes has a transform that is nearly a Gaussian: exp(-z q) with sigma_tr z = 90."""
     z, sigma_tr = 60.0, 1.5
     r = np.geomspace(1e-3, 60.0, 40)
 

@@ -8,7 +8,7 @@ from wgsss.optics import Dipole, Layer, Profile
 from wgsss.optics.layers import Layers
 from wgsss.optics.multipole import Multipole
 
-# 004 table 3, after Donner and Jensen 2006.
+# Mikkelsen 2009, table 3, after Donner and Jensen 2006.
 UPPER = Layer((0.005,) * 3, (1.3,) * 3, 1.4, thickness=6.0)
 LOWER = Layer((0.01,) * 3, (1.0,) * 3, 1.4)
 TABLE_3 = Layers((UPPER, LOWER))
@@ -19,7 +19,7 @@ MUSCLE = Layer((0.1, 0.3, 0.4), (0.8, 0.9, 1.0), 1.37)
 
 
 def images(sigma_a, sigma_s_prime, thickness, A_lit, A_other, r):
-    """R and T of a slab lit on one side, by the sums of 004 eq. 31 and 32, at signed heights above that side."""
+    """Return R and T of a slab lit on one side, by the sums of Mikkelsen 2009, eq. 31 and 32."""
     sigma_t_prime = sigma_a + sigma_s_prime
     mfp, sigma_tr = 1 / sigma_t_prime, np.sqrt(3 * sigma_a * sigma_t_prime)
     R, T = np.zeros_like(r), np.zeros_like(r)
@@ -39,12 +39,12 @@ def images(sigma_a, sigma_s_prime, thickness, A_lit, A_other, r):
 
 @pytest.fixture(scope="module")
 def by_fft():
-    """Table 3 as in 004 section 2.7.3: profiles on a plane of 128 mm, Fourier transformed, joined and brought back."""
+    """Return R and T of table 3 as in Mikkelsen 2009, 2.7.3: by Fourier transforms of profiles on a plane of 128 mm."""
     n, step = 512, 0.25
     x = np.fft.fftfreq(n, 1 / (n * step))
     r = np.hypot(x[:, None], x)
     at, inverse = np.unique(r.round(9), return_inverse=True)
-    out, inside = 3.25070, 1.0  # A of 1.4 to air (polynomial), and of equal indices
+    out, inside = 3.25070, 1.0  # A for an index of 1.4 under air (polynomial), and for equal indices
     over = np.hypot(at, 1e-12)
     top_R, top_T = images(0.005, 1.3, 6.0, out, inside, over)
     bottom_R, bottom_T = images(0.005, 1.3, 6.0, inside, out, over)
@@ -69,7 +69,7 @@ def test_table_3_is_that_of_a_plane_transform(by_fft):
     assert TABLE_3.total[0] == pytest.approx(R.sum() * 0.25**2, rel=2e-6)
 
 
-def test_no_light_leaves_a_stack_without_end_below():
+def test_no_light_leaves_an_infinitely_thick_stack_below():
     np.testing.assert_array_equal(TABLE_3.total_transmittance, 0.0)
     np.testing.assert_array_equal(TABLE_3.transmittance([0.0, 1.0]), 0.0)
 
@@ -83,8 +83,8 @@ def test_no_light_leaves_a_stack_without_end_below():
         ([Layer((0, 0, 0), (1, 2, 9), 1.5, thickness=1.01), Layer((0, 0, 0), (1, 2, 9), 1.0, thickness=40.0)], 1.6),
     ],
 )
-def test_energy_is_kept(layers, eta_below):
-    """No light is made; without absorption none is lost."""
+def test_energy_is_conserved(layers, eta_below):
+    """R and T together are at most 1, and 1 without absorption."""
     stack = Layers(layers, eta_below)
     assert np.all(stack.total + stack.total_transmittance < 1.0 + 1e-14)
     clear = Layers([Layer((0, 0, 0), layer.sigma_s_prime, layer.eta, layer.thickness) for layer in layers], eta_below)
@@ -92,7 +92,7 @@ def test_energy_is_kept(layers, eta_below):
 
 
 def test_one_layer_is_a_slab():
-    """To 1e-8 where R and T are above 1e-6 of their peaks."""
+    """The relative error is 1e-8 where R and T are above 1e-6 of their peaks."""
     one = Layers([SKIN], 1.2)
     slab = Multipole(SKIN.sigma_a, SKIN.sigma_s_prime, SKIN.eta, thickness=SKIN.thickness, eta_below=1.2)
     r = np.array([0.0, 1e-9, 1e-3, 0.1, 1.0, 4.0])
@@ -104,7 +104,7 @@ def test_one_layer_is_a_slab():
     np.testing.assert_array_equal(one.total_transmittance, slab.total_transmittance)
 
 
-def test_one_layer_without_end_is_a_dipole():
+def test_one_infinitely_thick_layer_is_a_dipole():
     for sigma_a in (MUSCLE.sigma_a, (0, 0, 0)):
         one = Layers([Layer(sigma_a, MUSCLE.sigma_s_prime, 1.37)])
         dipole = Dipole(sigma_a, MUSCLE.sigma_s_prime, 1.37)
@@ -115,22 +115,22 @@ def test_one_layer_without_end_is_a_dipole():
         np.testing.assert_allclose(one.line_spread(r[1:]), dipole.line_spread(r[1:]), rtol=2e-9)
 
 
-def test_deep_layers_do_not_show():
+def test_deep_layers_do_not_change_the_reflectance():
     thick = Layer(SKIN.sigma_a, SKIN.sigma_s_prime, SKIN.eta, thickness=60.0)
     buried = Layers([thick, FAT, Layer(MUSCLE.sigma_a, MUSCLE.sigma_s_prime, SKIN.eta)])
     bare = Dipole(SKIN.sigma_a, SKIN.sigma_s_prime, SKIN.eta)
     np.testing.assert_allclose(buried.reflectance([0.1, 2.0, 5.0]), bare.reflectance([0.1, 2.0, 5.0]), rtol=1e-8)
 
 
-def test_a_turned_stack_lets_through_another_amount():
-    """Light starts a mean free path below the lit face: T+ and T- differ, by design of the model."""
+def test_a_stack_turned_over_has_another_transmittance():
+    """The source is one mean free path below the lit face, so T+ and T- differ in this model."""
     stack, turned = Layers([SKIN, FAT]), Layers([FAT, SKIN])
     ratio = turned.total_transmittance / stack.total_transmittance
     assert np.all(np.abs(ratio - 1.0) > 0.05)
 
 
-def test_three_layers_are_two_and_one():
-    """Light goes to and fro between the first layer and the stack below it: explicit bounces, at some frequencies.
+def test_three_layers_are_a_layer_on_a_stack_of_two():
+    """Light goes back and forth between the first layer and the stack below it: explicit bounces, at some frequencies.
 
     All of index 1, so that each layer's R and T are those it has alone, lit on either side.
     """
@@ -164,8 +164,8 @@ def test_total_transmittance_is_the_integral_over_the_plane():
     np.testing.assert_allclose(ring.sum(axis=0) * (log_r[1] - log_r[0]), stack.total_transmittance, rtol=1e-7)
 
 
-def test_profiles_hold_at_any_distance():
-    """What fits and quadratures sample."""
+def test_profiles_are_finite_and_not_negative_at_any_distance():
+    """Fits and quadratures sample over these distances."""
     r = np.array([0.0, 1e-300, 1e-9, 1e-5, 1e5, 1e9, 1e150, np.inf])
     for stack in (TABLE_3, Layers([SKIN, FAT]), Layers([Layer((0, 0, 0), (1, 5, 50), 1.3)])):
         for profile in (stack.reflectance, stack.transmittance, stack.beyond, stack.line_spread):
@@ -198,7 +198,7 @@ def test_channels_are_independent():
     ("layers", "eta_below", "says"),
     [
         ([], 1.0, "a stack needs at least one layer"),
-        ([LOWER, UPPER], 1.0, "layer 1 has no end"),
+        ([LOWER, UPPER], 1.0, "layer 1 is infinitely thick"),
         (
             [UPPER, Layer((0, 0, 0.5), (3, 3, 1), thickness=0.5), LOWER],
             1.0,
@@ -209,6 +209,6 @@ def test_channels_are_independent():
         ([SKIN], 0.9, "eta_below must be a number from 1 to 3, not 0.9"),
     ],
 )
-def test_bad_stacks_are_told(layers, eta_below, says):
+def test_bad_stacks_raise_an_error(layers, eta_below, says):
     with pytest.raises(InputError, match=says):
         Layers(layers, eta_below)

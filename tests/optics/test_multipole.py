@@ -11,13 +11,13 @@ from wgsss.optics.multipole import Multipole
 
 
 def slab(measured, mean_free_paths, eta_below=1.0):
-    """A slab of a measured material, as many mean free paths thick as it has at least in one channel."""
+    """Return a slab of a measured material. Its thickness is in units of its largest mean free path."""
     thickness = mean_free_paths / (np.array(measured.sigma_a) + measured.sigma_s_prime).min()
     return Multipole(measured.sigma_a, measured.sigma_s_prime, measured.eta, thickness=thickness, eta_below=eta_below)
 
 
 def literal(medium, r, n):
-    """004 eq. 31 and 32 and the sums below them, for 2n + 1 dipoles at signed heights: R and T (3,)."""
+    """Return R and T (3,) by Mikkelsen 2009, eq. 31 and 32, as plain sums over 2n + 1 dipoles at signed heights."""
     a, b = (4 / 3 * boundary(medium.eta / eta) * medium.mean_free_path for eta in (1.0, medium.eta_below))  # 4 A D
     s, sigma_tr = medium.thickness, medium.sigma_tr
     i = np.arange(-n, n + 1)[:, None]
@@ -33,7 +33,7 @@ def literal(medium, r, n):
 
 
 def panels(length):
-    """Nodes and weights for integrals over all distances of what changes over `length`."""
+    """Return nodes and weights for integrals over all distances, of functions that vary over `length`."""
     x, w = np.polynomial.legendre.leggauss(12)
     edges = np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 30), np.arange(1.25, 60.0, 0.25)]) * length
     half = 0.5 * np.diff(edges)[:, None]
@@ -52,7 +52,7 @@ def test_images_are_those_of_equations_31_and_32(sigma_a, eta_below):
 
 @pytest.mark.parametrize("mean_free_paths", [1.05, 2.0, 10.0])
 def test_sums_are_the_inverse_of_their_transforms(measured, mean_free_paths):
-    """To 1e-8, of R and T where they are above 1e-6 of their peaks and of those elsewhere."""
+    """The error is 1e-8 of R and T where they are above 1e-6 of their peaks, and of the peaks elsewhere."""
     for eta_below in (1.0, measured.eta):
         try:
             medium = slab(measured, mean_free_paths, eta_below)
@@ -64,16 +64,16 @@ def test_sums_are_the_inverse_of_their_transforms(measured, mean_free_paths):
             (medium.reflectance(r), medium.spectrum),
             (medium.transmittance(r), medium.transmitted_spectrum),
         ):
-            # Of light in a channel that goes through less than 1e-20 comes, the transform keeps fewer digits.
-            kept = spectrum(0.0) > 1e-20
-            error = np.abs(hankel.plane(spectrum, r) - summed)[:, kept]
-            peak = summed.max(axis=0)[kept]
-            assert np.all(error < 1e-8 * np.where(summed[:, kept] > 1e-6 * peak, summed[:, kept], peak))
+            # In a channel whose transmittance is below 1e-20, the transform has fewer correct digits.
+            bright = spectrum(0.0) > 1e-20
+            error = np.abs(hankel.plane(spectrum, r) - summed)[:, bright]
+            peak = summed.max(axis=0)[bright]
+            assert np.all(error < 1e-8 * np.where(summed[:, bright] > 1e-6 * peak, summed[:, bright], peak))
 
 
 @pytest.mark.parametrize("mean_free_paths", [1.05, 2.0, 10.0])
 def test_transforms_are_those_of_the_sums(measured, mean_free_paths):
-    """By quadrature over r: within 1e-8 of the transform at k = 0, the integral over the plane."""
+    """Transform by quadrature over r. The error is 1e-8 of the transform at k = 0, the integral over the plane."""
     medium = slab(measured, mean_free_paths)
     r, w = panels(medium.thickness)
     for profile, spectrum, total in (
@@ -101,8 +101,8 @@ def test_closed_forms_are_the_integrals_of_reflectance(sigma_a):
     np.testing.assert_allclose(medium.enclosed(medium.range(0.02)).diagonal(), 0.98, rtol=1e-9)
 
 
-def test_images_left_out_are_made_up_for():
-    """Weak absorption needs most images: digits beyond those that leaving out all after the last would keep."""
+def test_the_sum_over_far_images_is_accurate():
+    """With weak absorption, leaving out the images after the last one would lose digits."""
     medium = Multipole((0, 1e-6, 1e-4), (1, 1, 1), thickness=1.2, eta_below=1.1)
     r = np.array([0.5, 2.5, 3.0])
     np.testing.assert_allclose(medium.reflectance(r), hankel.plane(medium.spectrum, r), rtol=1e-11)
@@ -119,13 +119,13 @@ def test_a_thick_slab_is_a_half_space(skin):
 
 
 def test_the_source_close_to_the_bottom_is_a_spike():
-    """Red marble, half a millimetre thick: 41 per mm^2 pass straight below, 0.456 mm deep the source."""
+    """Marble of 0.5 mm, red: 41 per mm^2 leave straight below a source that is 0.456 mm deep."""
     marble = Multipole((0.0021, 0.0041, 0.0071), (2.19, 2.62, 3.0), 1.5, thickness=0.5)
     assert marble.transmittance(0.0)[0] == pytest.approx(41.0, abs=0.5)
 
 
-def test_light_falls_off_as_between_absorbing_planes():
-    """Far out as exp(-r sqrt(sigma_tr^2 + (pi / H)^2)) / sqrt(r), and never below 0."""
+def test_light_falls_off_as_between_two_black_planes():
+    """Far away R and T fall off as exp(-r sqrt(sigma_tr^2 + (pi / H)^2)) / sqrt(r), and are never negative."""
     medium = Multipole((0.001, 0, 0.1), (1, 1, 1), 1.3, thickness=2.0)
     H = medium.thickness + 4 / 3 * boundary(1.3) * medium.mean_free_path
     rate = np.sqrt(medium.sigma_tr**2 + (np.pi / H) ** 2)
@@ -137,7 +137,7 @@ def test_light_falls_off_as_between_absorbing_planes():
         assert np.all(np.isfinite(sent)) and np.all(sent >= 0.0)
 
 
-def test_transforms_hold_from_no_to_huge_frequencies(skin):
+def test_transforms_are_finite_from_zero_to_huge_frequencies(skin):
     for sigma_a in (skin.sigma_a, (0, 0, 0)):
         medium = Multipole(sigma_a, skin.sigma_s_prime, skin.eta, thickness=5.0)
         k = np.array([0.0, 1e-200, 1e-9, 1e-3, 1.0, 30.0, 1e4, 1e100])
@@ -184,18 +184,18 @@ def test_channels_are_independent(skin):
         ({"thickness": 1.36, "eta": 1.5, "eta_below": 1.5}, r"at least 2\.55\d mm in red.* 1.295 mm.* not 1.36"),
     ],
 )
-def test_bad_slabs_are_told(arguments, says):
+def test_bad_slabs_raise_an_error(arguments, says):
     whole = {"sigma_a": (0.032, 0.17, 0.48), "sigma_s_prime": (0.74, 0.88, 1.01)} | arguments
     with pytest.raises(InputError, match=says):
         Multipole(**whole)
 
 
-def test_just_above_the_mean_free_path_is_good():
+def test_a_slab_just_thicker_than_a_mean_free_path_is_accepted():
     medium = Multipole((0, 0, 0), (1, 1, 1), thickness=1.0 + 1e-9)
     assert np.all(np.isfinite(medium.transmittance([0.0, 1.0]))) and np.all(medium.total > 0.0)
 
 
-def test_bad_distances_are_told():
+def test_bad_distances_raise_an_error():
     medium = Multipole((0, 0, 0), (1, 1, 1), thickness=3.0)
     for profile in (medium.reflectance, medium.transmittance, medium.beyond):
         with pytest.raises(InputError, match="distances must be at least 0"):

@@ -1,4 +1,4 @@
-"""What every model keeps of the protocol."""
+"""Properties that every profile must have."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def table(turn: list[int], size: float) -> Tabulated:
 
 
 def photons(turn: list[int], size: float) -> Photons:
-    """Counts as a dipole would give them."""
+    """Return the counts of photons that a dipole predicts."""
     edges = np.append(0.0, np.geomspace(0.01, 30.0, 300))
     beyond = dipole([0, 1, 2], 1.0).beyond(edges)[:, turn] * dipole(turn, 1.0).total
     R = -np.diff(beyond, axis=0) / (np.pi * np.diff(np.square(size * edges))[:, None])
@@ -89,7 +89,7 @@ def model(request: pytest.FixtureRequest) -> Callable[[list[int], float], Profil
 
 
 def values(profile: Profile, r: np.ndarray) -> dict[str, np.ndarray]:
-    """All that depends on lengths, in the units that `r` is in."""
+    """Return all results that depend on lengths, in the unit of `r`."""
     found = {name: getattr(profile, name)(r) for name in ("reflectance", "transmittance", "enclosed", "line_spread")}
     found |= {"total": profile.total, "total_transmittance": profile.total_transmittance, "range": profile.range(0.05)}
     return found | dict(zip(("table r", "table R"), profile.table(5), strict=True))
@@ -124,14 +124,14 @@ def test_total_range_and_line_spread_are_integrals_of_reflectance(model):
         np.testing.assert_allclose(1 - profile.enclosed(profile.range(eps)).diagonal(), eps, rtol=1e-6)
 
 
-def test_a_table_of_any_profile_is_near_it(model):
+def test_a_table_of_any_profile_reproduces_it(model):
     profile = model([0, 1, 2], 1.0)
     again = Tabulated(*profile.table(200))
     r = np.geomspace(0.05, 5.0, 20)
     np.testing.assert_allclose(again.reflectance(r), profile.reflectance(r), rtol=0.02, atol=1e-6)
 
 
-def test_a_black_profile_has_no_range():
+def test_the_range_of_a_black_profile_is_zero():
     black = SumOfGaussians([1.0], [[0.5, 0.0, 0.2]])
     np.testing.assert_array_equal(black.range(0.01) > 0, [True, False, True])
     np.testing.assert_array_equal(black.enclosed(0.0), [0.0, 1.0, 0.0])
@@ -139,6 +139,6 @@ def test_a_black_profile_has_no_range():
     assert np.all(np.diff(r) > 0) and not values.any()
 
 
-def test_too_small_a_table_is_told():
+def test_a_table_of_one_entry_raises_an_error():
     with pytest.raises(InputError, match="at least 2 entries, not 1"):
         dipole([0, 1, 2], 1.0).table(1)

@@ -31,22 +31,22 @@ def edge_error(profile, terms, degrees, channel=0):
     along = (place[:, None] * np.cos(a) + place * np.sin(a)).ravel()
     order = np.argsort(along)
     edges = np.linspace(-4, 4, 200)
-    # Halfway through the cells that the edge crosses: a mean over edges within a quarter of a tenth of a millimetre.
+    # The mean over edges within 0.02 mm to either side, since a cell is a point: it lies on one side or the other.
     near = edges[:, None] + np.linspace(-0.02, 0.02, 9)
     reached = np.concatenate([[0.0], np.cumsum(product.ravel()[order])])[np.searchsorted(along[order], near)].mean(1)
     return np.abs(reached - profile.step_response(near)[..., channel].mean(1)).max() / profile.total[channel]
 
 
 @pytest.mark.parametrize(("degrees", "error"), [(22.5, 0.062), (45, 0.074)])
-def test_the_line_spreads_product_errs_at_angles(degrees, error):
-    """The figures for all six Gaussians, and for five as shares of full scale, were computed from the closed form."""
+def test_the_error_of_the_product_of_line_spreads_at_angles(degrees, error):
+    """The expected figures, for all six Gaussians and for five, were computed from the closed form."""
     assert edge_error(SKIN_GAUSSIANS, line_spread(SKIN_GAUSSIANS), degrees) == pytest.approx(error, abs=0.004)
     left = edge_error(WITHOUT_THE_NARROWEST, line_spread(WITHOUT_THE_NARROWEST), degrees)
     assert left * WITHOUT_THE_NARROWEST.total[0] == pytest.approx({22.5: 0.024, 45: 0.034}[degrees], abs=0.002)
 
 
 @pytest.mark.parametrize("degrees", [10, 22.5, 35, 45])
-def test_a_second_product_holds_at_every_angle(degrees):
+def test_the_error_with_a_second_product_is_small_at_every_angle(degrees):
     assert edge_error(SKIN_GAUSSIANS, svd(SKIN_GAUSSIANS), degrees) < 0.02
     assert edge_error(WITHOUT_THE_NARROWEST, svd(WITHOUT_THE_NARROWEST), degrees) < 0.008
 
@@ -79,8 +79,8 @@ def test_line_spread_of_other_profiles_by_quadrature(profile):
     assert np.all(profile.beyond(term.x[-1]) <= BEYOND * 1.001)
 
 
-def test_what_the_second_product_adds():
-    """To nothing in all, nor in a row: uniform light and edges along the passes are the first's."""
+def test_the_second_product_adds_no_light():
+    """It sums to 0 in all and in each row: it changes neither uniform light nor edges along the passes."""
     first, second = svd(SKIN_GAUSSIANS)
     (line,) = line_spread(SKIN_GAUSSIANS)
     np.testing.assert_allclose(second.within[-1], 0, atol=1e-9)

@@ -25,11 +25,11 @@ def test_a_table_of_the_dipole_is_the_dipole(measured):
     table = Tabulated(*table_of(dipole))
     np.testing.assert_allclose(table.total, dipole.total, rtol=1e-3)
     r = np.geomspace(1e-4, dipole.range(1e-4).max(), 999)
-    near = r[:, None] < dipole.range(1e-3)  # in each channel; far outside of it a channel has fallen by many decades
+    near = r[:, None] < dipole.range(1e-3)  # in each channel: far beyond, R has fallen by many decades
     np.testing.assert_allclose(table.reflectance(r)[near], dipole.reflectance(r)[near], rtol=5e-3)
 
 
-def test_entries_are_met_and_never_undershot():
+def test_the_curve_passes_through_the_entries_and_is_never_negative():
     """A noisy histogram, with empty bins."""
     rng = np.random.default_rng(7)
     r = np.arange(40) * 0.25
@@ -70,7 +70,7 @@ def test_closed_forms_are_the_integrals_of_reflectance(first, skin):
     assert table.line_spread(np.zeros((2, 1))).shape == (2, 1, 3)
 
 
-def test_what_profiles_give_by_themselves(table, skin):
+def test_the_range_and_the_line_spread_of_a_table_are_accurate(table, skin):
     np.testing.assert_allclose(table.range(0.01), skin.range(0.01), rtol=5e-3)
     np.testing.assert_allclose(table.line_spread([0.3, 2.0]), Profile.line_spread(table, [0.3, 2.0]), rtol=1e-3)
 
@@ -90,7 +90,7 @@ def test_channels_are_independent(table):
     np.testing.assert_array_equal(turned.total, table.total[[2, 0, 1]])
 
 
-def test_reads_csv(tmp_path, table):
+def test_a_csv_file_is_read(tmp_path, table):
     path = tmp_path / "skin.csv"
     rows = [",".join(map(repr, map(float, row))) for row in np.column_stack([table.r, table.R])]
     for head in ([], ["r (mm),R,G,B"], ["# from a notebook", "", "r_mm, red, green, blue", ",,,"]):
@@ -123,7 +123,7 @@ def test_reads_csv(tmp_path, table):
         (b"\xff\xfe\x00", "not UTF-8"),
     ],
 )
-def test_bad_files_are_told(tmp_path, text, says):
+def test_bad_files_raise_an_error(tmp_path, text, says):
     path = tmp_path / "bad.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=rf"bad\.csv: .*{says}") as told:
@@ -131,7 +131,7 @@ def test_bad_files_are_told(tmp_path, text, says):
     assert "\n" not in str(told.value)
 
 
-def test_missing_files_are_told(tmp_path):
+def test_missing_files_raise_an_error(tmp_path):
     with pytest.raises(InputError, match=r"none\.csv: no such file"):
         Tabulated.read(tmp_path / "none.csv")
     with pytest.raises(InputError, match="this is a folder"):
@@ -150,7 +150,7 @@ def test_missing_files_are_told(tmp_path):
         ([0.0, 1.0], [[1, 1, 1], [1, -1, 1]], "R of green in row 2"),
     ],
 )
-def test_bad_tables_are_told(r, R, says):
+def test_bad_tables_raise_an_error(r, R, says):
     with pytest.raises(InputError, match=says):
         Tabulated(r, R)
 
@@ -160,7 +160,7 @@ def test_tables_cannot_be_changed_in_place(table):
         table.R[0, 0] = 0.0
 
 
-def test_a_dipole_goes_to_a_file_and_back(tmp_path, skin):
+def test_a_dipole_written_to_a_file_and_read_is_the_same(tmp_path, skin):
     path = tmp_path / "skin.csv"
     np.savetxt(path, np.column_stack(table_of(skin)), delimiter=",", header="r,R,G,B")
     np.testing.assert_allclose(Tabulated.read(path).total, Dipole.total.fget(skin), rtol=1e-3)

@@ -346,7 +346,7 @@ def test_invalid_input_is_an_error(gpu):
         ({"eta_below": 0.9}, "eta_below must be a number from 1 to 3"),
         ({"eta_below": np.nan}, "eta_below must be a number from 1 to 3"),
         ({"layers": []}, "at least one layer"),
-        ({"layers": [SKIN, SLAB, SKIN]}, "layer 1 has no end"),
+        ({"layers": [SKIN, SLAB, SKIN]}, "layer 1 is infinitely thick"),
     ):
         with pytest.raises(InputError, match=says):
             trace(**{"layers": [SKIN], "gpu": gpu, **arguments})

@@ -1,4 +1,8 @@
-"""How light spreads below a surface. Lengths in mm, profiles in 1/mm^2, per RGB channel; no GPU."""
+"""Models of how light spreads below a surface.
+
+Lengths are in mm, coefficients in 1/mm and profiles in 1/mm^2. Arrays have one value for each RGB channel. Nothing here
+uses a GPU.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The empirical profile of Borshukov and Lewis 2003: a power of the distance."""
+"""The empirical profile of Borshukov and Lewis (2003): a negative power of the distance."""
 
 from __future__ import annotations
 
@@ -14,16 +14,15 @@ from wgsss.optics.samples import DISTANCES, MEASURE, levelled, root_energy, scal
 
 Array = NDArray[np.float64]
 
-_STEEPEST = 1000.0  # by then (1 + r / c)^-k is an exponential for all that can be seen
+_LARGEST_K = 1000.0  # (1 + r / c)^-k then is visibly the same as an exponential
 
 
 @dataclass(frozen=True, eq=False)
 class BorshukovLewis(Profile):
-    """R(r) ~ 1 / (c + r)^k (004 eq. 45), scaled to a total.
+    """R(r) proportional to 1 / (c + r)^k (Mikkelsen 2009, eq. 45), scaled to a given total.
 
-    `albedo`: (3,), the profile's total, at least 0. `k`: (3,), above 2, or there would be no finite total. `c`: (3,) in
-    mm, above 0.
-    Raises InputError, naming the channel, for anything else.
+    `albedo` (3,): the total, at least 0. `k` (3,): the exponent, above 2, so that the total is finite. `c` (3,): mm,
+    above 0. Raises InputError, naming the channel, for other values.
     """
 
     albedo: Array
@@ -37,25 +36,25 @@ class BorshukovLewis(Profile):
 
     @classmethod
     def fit(cls, profile: Profile) -> Self:
-        """The k and c nearest to `profile` by the r-weighted squared error of 003 eq. 2, with its total kept.
+        """Fit k and c to `profile`, with the same total. Deterministic.
 
-        The source's k and c, and those of 004 figure 8, were chosen by eye. k goes up to 1000, where an exponential is
-        nearer. Over the materials of Jensen et al. 2001 the `fit_error` is 7.5 to 13 %. 1 mm stands for c, and 4 for k,
-        in a black channel. Deterministic.
+        The fit minimises the r-weighted squared error of Jimenez & Gutierrez 2008, eq. 2. (Borshukov and Lewis, and
+        Mikkelsen 2009, figure 8, chose k and c by eye.) Where an exponential fits better, k reaches its limit of 1000.
+        Over the materials of Jensen et al. 2001 the `fit_error` is 7.5 to 13 %. A black channel gets k = 4, c = 1 mm.
         """
         from scipy.optimize import least_squares
 
         unit, total = scale(profile), profile.total
-        wanted = levelled(profile, unit)
-        energy = root_energy(wanted)
+        samples = levelled(profile, unit)
+        energy = root_energy(samples)
         k, c = np.full(3, 4.0), np.ones(3)
         for i in np.flatnonzero(energy):
 
-            def missed(x: Array, i: Any = i) -> Array:
-                one = cls(np.full(3, total[i]), *_parameters(np.repeat(x[:, None], 3, axis=1)))
-                return np.sqrt(MEASURE[:, 0]) * (one.reflectance(DISTANCES)[:, i] - wanted[:, i]) / energy[i]
+            def residual(x: Array, i: Any = i) -> Array:
+                trial = cls(np.full(3, total[i]), *_parameters(np.repeat(x[:, None], 3, axis=1)))
+                return np.sqrt(MEASURE[:, 0]) * (trial.reflectance(DISTANCES)[:, i] - samples[:, i]) / energy[i]
 
-            x = least_squares(missed, (0.0, -1.0), bounds=((-7.0, -15.0), (np.log(_STEEPEST - 2.0), 15.0))).x
+            x = least_squares(residual, (0.0, -1.0), bounds=((-7.0, -15.0), (np.log(_LARGEST_K - 2.0), 15.0))).x
             k[i], c[i] = _parameters(x)
         return cls(total, k, c * unit)
 
@@ -73,10 +72,11 @@ class BorshukovLewis(Profile):
         return np.where(self.albedo > 0.0, share, 0.0)
 
     def _share(self, r: ArrayLike) -> Array:
+        """Return c / (c + r) (..., 3)."""
         return self.c / (self.c + distances(r)[..., None])
 
 
 def _parameters(x: Array) -> tuple[Array, Array]:
-    """k and c from the logarithms of k - 2 and of c / k: the latter hardly moves where k grows without end."""
+    """Return k and c from log(k - 2) and log(c / k). For large k the profile depends on c / k alone."""
     k = 2.0 + np.exp(x[0])
     return k, k * np.exp(x[1])

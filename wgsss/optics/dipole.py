@@ -1,4 +1,4 @@
-"""Diffusion profiles of a half space by a real and a mirrored point source."""
+"""Diffusion profiles of a half space, from a point source in it and its mirror image above the surface."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ Term = Callable[..., Array]
 
 
 class Dipole(Medium, Profile):
-    """The classical dipole (Jensen et al. 2001, as corrected by 004 eq. 30), of a `Medium` under air.
+    """The classical dipole of a half space of a `Medium` under air.
 
-    The profile is per unit of flux that entered the medium: Fresnel losses on the way in and out are the renderer's.
+    Source: Jensen et al. 2001, as corrected by Mikkelsen 2009, eq. 30. The profile is per unit of flux that has entered
+    the medium. It leaves out the Fresnel losses on the way in and out, which the renderer applies.
     """
 
     @property
     def z_r(self) -> Array:
-        """Depth of the real source (3,) in mm: a mean free path."""
+        """Depth of the real source (3,), mm: one mean free path."""
         return self.mean_free_path
 
     @property
     def z_v(self) -> Array:
-        """Height of the virtual source (3,) in mm: the real one mirrored in the extrapolated boundary, 2 A D above."""
+        """Height of the virtual source (3,), mm: the real one mirrored in the plane 2 A D above the surface."""
         return self.z_r + 4.0 * fresnel.boundary(self.eta) * self.diffusion
 
     @property
@@ -48,7 +49,10 @@ class Dipole(Medium, Profile):
         return self._radiated(sources.flux_along, sources.fluence_pair_along, np.abs(np.asarray(x)))
 
     def _radiated(self, flux: Term, fluence: Term, r: ArrayLike) -> Array:
-        """What leaves, from what the two sources send through the surface."""
+        """Return the light that leaves at `r` (...), (..., 3), from the terms of one source.
+
+        `flux` and `fluence` are functions of `sources`, for a point, a line or the plane beyond r.
+        """
         return self.albedo * self._both(flux, distances(r)[..., None])
 
     def _both(self, flux: Term, r: Array) -> Array:
@@ -56,27 +60,29 @@ class Dipole(Medium, Profile):
 
     @classmethod
     def from_reflectance(cls, reflectance: ArrayLike, *, eta: float = 1.3, **length: ArrayLike) -> Self:
-        """The medium whose `total` is `reflectance` (3,), above 0 and below 1, under this model's boundary.
+        """Return the medium with a given total reflectance and a given length.
 
-        That boundary is a smooth one under air which reflects diffuse light inside as an index of `eta` does; `eta` = 1
-        is the index-matched case. Give one length (3,) in mm: `mean_free_path`, 1 / sigma_t', or
-        `diffuse_mean_free_path`, 1 / sigma_tr. Raises InputError, naming the channel, for what no medium has.
+        `reflectance` (3,): the `total` of the profile, above 0 and below 1. `eta`: refractive index relative to air; 1
+        means a boundary without reflection. `length`: either `mean_free_path`, 1 / sigma_t', or
+        `diffuse_mean_free_path`, 1 / sigma_tr, (3,) in mm. Raises InputError, naming the channel, if no medium has
+        these values.
         """
         from scipy.optimize import brentq
 
         if length.keys() not in ({"mean_free_path"}, {"diffuse_mean_free_path"}):
-            raise InputError("give mean_free_path or diffuse_mean_free_path, one of them")
-        wanted = coefficients("reflectance", reflectance, 0.0, 1.0, above=True)
+            raise InputError("give one length: mean_free_path or diffuse_mean_free_path")
+        totals = coefficients("reflectance", reflectance, 0.0, 1.0, above=True)
         ((name, value),) = length.items()
         scale = coefficients(name, value, SHORTEST, LONGEST, "mm")
 
-        def unit(albedo: float) -> Dipole:  # a mean free path of 1 mm
+        def unit(albedo: float) -> Dipole:
+            """Return the dipole of a medium with a mean free path of 1 mm."""
             return cls(np.full(3, 1.0 - albedo), np.full(3, albedo), eta)
 
         least, most = 1e-9, 1.0 - 1e-12
         low, high = unit(least).total[0], unit(most).total[0]
         albedo = np.empty(3)
-        for i, R in enumerate(wanted):
+        for i, R in enumerate(totals):
             if not low < R < high:
                 bounds = f"above {low:.2g} and below {high:.4g}"
                 raise InputError(f"reflectance of {CHANNELS[i]} must be {bounds}, not {R:g}")
@@ -85,20 +91,21 @@ class Dipole(Medium, Profile):
             scale = scale * np.array([unit(a).sigma_tr[0] for a in albedo])
         for i, sigma in enumerate(albedo / scale):
             if not THINNEST <= sigma <= DENSEST:
-                found = f"sigma_s' would be {sigma:.3g}, and must be {span(THINNEST, DENSEST, unit='1/mm')}"
-                raise InputError(f"{name} of {CHANNELS[i]} does not go with its reflectance: {found}")
+                reason = f"sigma_s' would be {sigma:.3g}, and must be {span(THINNEST, DENSEST, unit='1/mm')}"
+                raise InputError(f"{name} of {CHANNELS[i]} does not fit its reflectance: {reason}")
         return cls((1.0 - albedo) / scale, albedo / scale, eta)
 
 
 class BetterDipole(Dipole):
-    """The better dipole (d'Eon 2012): Grosjean's diffusion coefficient, and a boundary that lets out fluence and flux.
+    """The better dipole of a half space under air (d'Eon 2012).
 
-    It holds light that was scattered more than once, hence its alpha'^2.
+    It differs from `Dipole` by Grosjean's diffusion coefficient and by an exitance that depends on fluence and flux. It
+    counts only light that was scattered at least twice, hence its factor alpha'^2.
     """
 
     @property
     def diffusion(self) -> Array:
-        """Grosjean's diffusion coefficient (2 sigma_a + sigma_s') / (3 sigma_t'^2) (3,) in mm."""
+        """Grosjean's diffusion coefficient (2 sigma_a + sigma_s') / (3 sigma_t'^2) (3,), mm."""
         return (2.0 * self.sigma_a + self.sigma_s_prime) / (3.0 * np.square(self.sigma_t_prime))
 
     @property

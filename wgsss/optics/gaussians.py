@@ -1,4 +1,4 @@
-"""Diffusion profiles as sums of Gaussians, the form that separable blurs can apply."""
+"""Diffusion profiles as sums of Gaussians, which separable blurs can apply."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _erf = np.vectorize(math.erf, otypes=[np.float64])
 class SumOfGaussians(Profile):
     """R(r) = sum_k w_k G(v_k, r) with G(v, r) = exp(-r^2 / 2v) / (2 pi v), whose integral over the plane is 1.
 
-    `variances` in mm^2: (k,), ascending, shared by the channels, which is what blurs need; or (k, 3), a set per
-    channel, each not descending: a channel that needs fewer Gaussians may repeat its last variance with a weight of 0.
-    `weights`: (k, 3), per RGB channel, dimensionless. Raises InputError for anything else.
-    Source: 004 section 3.4, 003 eq. 2.
+    `variances`, mm^2: either (k,), ascending, shared by the channels, as blurs need them; or (k, 3), a column for each
+    channel, not descending. A channel with fewer Gaussians repeats its last variance with the weight 0.
+    `weights` (k, 3): at least 0, without unit. Raises InputError for other values.
+    Source: Mikkelsen 2009, section 3.4; Jimenez & Gutierrez 2008, eq. 2.
     """
 
     variances: Array
@@ -48,8 +48,8 @@ class SumOfGaussians(Profile):
         steps = np.diff(variances, axis=0)
         ascending = np.all(steps > 0 if variances.ndim == 1 else steps >= 0)
         if not (np.all((variances >= _NARROWEST) & (variances <= _WIDEST)) and ascending):
-            wanted = f"positive and ascending, {span(_NARROWEST, _WIDEST, unit='mm^2')}"
-            raise InputError(f"variances must be {wanted}, not {shown(variances.tolist())}")
+            condition = f"positive and ascending, {span(_NARROWEST, _WIDEST, unit='mm^2')}"
+            raise InputError(f"variances must be {condition}, not {shown(variances.tolist())}")
         if not (np.all(weights >= 0) and np.all(weights.sum(axis=0) <= MOST_TOTAL)):
             raise InputError(
                 f"weights must not be negative, and sum to {MOST_TOTAL:g} at most, not {shown(weights.tolist())}"
@@ -73,7 +73,7 @@ class SumOfGaussians(Profile):
         return self._sum(np.exp(-np.square(_each(x)) / (2.0 * self._v)) / np.sqrt(2.0 * np.pi * self._v))
 
     def step_response(self, x: ArrayLike) -> Array:
-        """Radiosity (..., 3) at `x` (...) mm from a straight edge, where the side x > 0 receives unit irradiance."""
+        """Return the radiosity (..., 3) at `x` (...) mm from a straight edge, if the side x > 0 has unit irradiance."""
         return self._sum(0.5 * (1.0 + _erf(_each(x) / np.sqrt(2.0 * self._v))))
 
     @property
@@ -82,17 +82,17 @@ class SumOfGaussians(Profile):
         return self.variances.reshape(len(self.variances), -1)
 
     def _sum(self, terms: Array) -> Array:
-        """The weighted sum (..., 3) of the Gaussians' terms (..., k, 1 or 3)."""
+        """Return the weighted sum (..., 3) of `terms` (..., k, 1 or 3) of the Gaussians."""
         return (terms * self.weights).sum(axis=-2)
 
 
 def _each(r: ArrayLike) -> Array:
-    """`r` (...) with axes for Gaussians and channels."""
+    """Return `r` (...) with two more axes, for the Gaussians and the channels."""
     return np.asarray(r, dtype=np.float64)[..., None, None]
 
 
 def gaussian(variance: ArrayLike, r: ArrayLike) -> Array:
-    """G(v, r) in 1/mm^2, the radial Gaussian of `variance` mm^2 normalised over the plane."""
+    """Return G(v, r) in 1/mm^2 at distances `r` mm: the Gaussian of `variance` mm^2 with integral 1 over the plane."""
     v = np.asarray(variance, dtype=np.float64)
     return np.exp(-np.square(np.asarray(r, dtype=np.float64)) / (2.0 * v)) / (2.0 * np.pi * v)
 
@@ -110,4 +110,7 @@ SKIN_GAUSSIANS = SumOfGaussians(
         ]
     ),
 )
-"""Skin of d'Eon and Luebke, a fit to a three-layer multipole (004 table 4). White: each channel sums to 1."""
+"""Skin by d'Eon and Luebke: a fit to a multipole of three layers (Mikkelsen 2009, table 4).
+
+Each channel sums to 1: the colour of skin comes from a map.
+"""

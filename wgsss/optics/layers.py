@@ -27,19 +27,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Layers(Profile):
-    """A stack of layers under air, lit from above (Donner and Jensen 2005; 004 section 2.7.2).
+    """A stack of layers under air, lit from above.
 
-    `layers`: from the top down; each finite one thicker than its mean free path in every channel. `eta_below`: index of
-    what lies below a last layer of finite thickness, relative to air, 1 to 3. Raises InputError for anything else,
-    naming the layer, the channel and its mean free path.
+    `layers`: from the top down. Each layer of finite thickness must be thicker than its mean free path in every
+    channel. `eta_below`: refractive index of the medium below a finite last layer, relative to air, 1 to 3. Raises
+    InputError for other values, naming the layer, the channel and its mean free path.
 
-    Each layer's R and T, between its neighbours' indices, as of `Multipole` (a `Dipole` where it has no end), are
-    joined by their Fourier transforms: light that goes to and fro between two layers is a geometric series. Light that
-    passes from layer to layer starts anew a mean free path deep, so that splitting a layer in two changes the result.
+    Source: Donner and Jensen 2005; Mikkelsen 2009, section 2.7.2. The R and T of each layer are those of a `Multipole`
+    between the indices of its neighbours, or of a `Dipole` if it is infinitely thick. The Fourier transforms of two
+    layers are combined in a geometric series over the light that goes back and forth between them. The model assumes
+    that light enters each layer from a source one mean free path deep, so splitting a layer in two changes the result.
 
-    The profile is what leaves at the top, `transmittance` what leaves at the bottom, per unit of flux that entered.
-    They are good to 1e-14 of the total over 2 pi r^2, and 0 where rounding makes them negative, or the model itself:
-    with layers of hardly more than a mean free path that happens far out, to 0.2 % of R and 2 % of T at most.
+    The profile is the light that leaves at the top, and `transmittance` that at the bottom, per unit of flux that has
+    entered. Their error is 1e-14 of the total over 2 pi r^2. Negative values are set to 0. They come from rounding, or
+    from the model itself: far from the entry, in layers hardly thicker than a mean free path, they would reach 0.2 % of
+    R and 2 % of T.
     """
 
     layers: Sequence[Layer]
@@ -59,25 +61,25 @@ class Layers(Profile):
 
     @property
     def total_transmittance(self) -> Array:
-        """T_tot (3,): the integral of T over the plane; 0 where the last layer has no end."""
+        """T_tot (3,): the integral of T over the plane; 0 if the last layer is infinitely thick."""
         return self.transmitted_spectrum(0.0)
 
     def spectrum(self, k: ArrayLike) -> Spectrum:
-        """Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
+        """Return the Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
 
         `k` may be complex, with a positive real part.
         """
         return self._spectra(k).R_above
 
     def transmitted_spectrum(self, k: ArrayLike) -> Spectrum:
-        """Fourier transform of T over the plane: see `spectrum`."""
+        """Return the Fourier transform of T over the plane, as `spectrum` does for R."""
         return self._spectra(k).T_down
 
     def reflectance(self, r: ArrayLike) -> Array:
         return np.maximum(hankel.plane(self.spectrum, self._resolved(r)), 0.0)
 
     def transmittance(self, r: ArrayLike) -> Array:
-        """T(r) in 1/mm^2, (..., 3): what leaves at the bottom `r` (...) mm from straight below the entry."""
+        """Return T(r) in 1/mm^2, (..., 3): light that leaves at the bottom, `r` (...) mm from below the entry."""
         return np.maximum(hankel.plane(self.transmitted_spectrum, self._resolved(r)), 0.0)
 
     def beyond(self, r: ArrayLike) -> Array:
@@ -88,10 +90,11 @@ class Layers(Profile):
         return np.maximum(hankel.line(self.spectrum, self._resolved(x)), 0.0)
 
     def _resolved(self, r: ArrayLike) -> Array:
-        """Distances, but for those so small that profiles are flat there."""
+        """Return distances (...), mm, of at least 1e-5 mean free paths: nearer, profiles are constant."""
         return np.maximum(distances(r), 1e-5 * min(layer.mean_free_path.min() for layer in self.layers))
 
     def _spectra(self, k: ArrayLike) -> SlabSpectra:
+        """Return the transforms of the whole stack at `k` (...)."""
         indices = [1.0, *(layer.eta for layer in self.layers), self.eta_below]
         joined, *others = (
             _layer_spectra(layer, above, below, k)
@@ -103,6 +106,7 @@ class Layers(Profile):
 
 
 def _layer_spectra(layer: Layer, above: float, below: float, k: ArrayLike) -> SlabSpectra:
+    """Return the transforms of one layer between media of indices `above` and `below` at `k` (...)."""
     if not math.isinf(layer.thickness):
         return slab_spectra(layer, layer.thickness, above, below, k)
     q = decay(layer, k)
@@ -113,7 +117,7 @@ def _layer_spectra(layer: Layer, above: float, below: float, k: ArrayLike) -> Sl
 
 
 def _join(upper: SlabSpectra, lower: SlabSpectra) -> SlabSpectra:
-    """Two slabs, one on the other (004 section 2.7.3)."""
+    """Return the transforms of two slabs, one on top of the other (Mikkelsen 2009, section 2.7.3)."""
     between = 1.0 / (1.0 - upper.R_below * lower.R_above)
     return SlabSpectra(
         upper.R_above + upper.T_down * lower.R_above * upper.T_up * between,

@@ -18,21 +18,21 @@ Array = NDArray[np.float64]
 CHANNELS = ("red", "green", "blue")
 
 THINNEST, DENSEST = 1e-6, 1e6
-"""1/mm: of the coefficients of materials; models may need less scattering, but no medium has more"""
+"""1/mm: limits of the coefficients of materials. Some models need less scattering; none may have more."""
 SHORTEST, LONGEST = 1e-6, 1e6
-"""mm: of lengths in media"""
+"""mm: limits of the lengths that users give."""
 FARTHEST = 1e12
-"""mm: of lengths that follow from others"""
+"""mm: the largest length that may follow from others."""
 MOST_TOTAL = 100.0
-"""of the light that a profile gives back in all: no medium more than 1, but tables and fits may be off"""
+"""The largest total of a profile. No medium reflects more than 1, but tables and fits may be inexact."""
 
 
 @dataclass(frozen=True, eq=False)
 class Medium:
-    """Coefficients of a homogeneous medium.
+    """The coefficients of a homogeneous medium.
 
-    `sigma_a`: absorption (3,) in 1/mm, at least 0. `sigma_s_prime`: reduced scattering (3,) in 1/mm, above 0.
-    `eta`: refractive index relative to air, 1 to 3. Raises InputError, naming the channel, for anything else.
+    `sigma_a` (3,): absorption in 1/mm, at least 0. `sigma_s_prime` (3,): reduced scattering in 1/mm, above 0.
+    `eta`: refractive index relative to air, 1 to 3. Raises InputError, naming the channel, for other values.
     """
 
     sigma_a: Array
@@ -47,12 +47,12 @@ class Medium:
 
     @property
     def sigma_t_prime(self) -> Array:
-        """Reduced extinction (3,) in 1/mm."""
+        """Reduced extinction sigma_t' = sigma_a + sigma_s' (3,), 1/mm."""
         return self.sigma_a + self.sigma_s_prime
 
     @property
     def mean_free_path(self) -> Array:
-        """1 / sigma_t' (3,) in mm."""
+        """Mean free path 1 / sigma_t' (3,), mm."""
         return 1.0 / self.sigma_t_prime
 
     @property
@@ -62,17 +62,20 @@ class Medium:
 
     @property
     def diffusion(self) -> Array:
-        """Diffusion coefficient D = 1 / (3 sigma_t') (3,) in mm."""
+        """Diffusion coefficient D = 1 / (3 sigma_t') (3,), mm."""
         return self.mean_free_path / 3.0
 
     @property
     def sigma_tr(self) -> Array:
-        """Effective transport coefficient (3,) in 1/mm; 0 where nothing absorbs, and R then falls as 1/r^3."""
+        """Effective transport coefficient sigma_tr = sqrt(sigma_a / D) (3,), 1/mm.
+
+        It is 0 without absorption. R then falls off as 1/r^3.
+        """
         return np.sqrt(self.sigma_a / self.diffusion)
 
     @property
     def diffuse_mean_free_path(self) -> Array:
-        """1 / sigma_tr (3,) in mm; infinite where nothing absorbs."""
+        """Diffuse mean free path 1 / sigma_tr (3,), mm; infinite without absorption."""
         with np.errstate(divide="ignore"):
             return 1.0 / self.sigma_tr
 
@@ -81,8 +84,9 @@ class Medium:
 class Layer(Medium):
     """A plane layer of a medium.
 
-    `thickness`: mm, above 0; infinite for the last of a stack. `g`: mean cosine of its Henyey-Greenstein phase
-    function, above -1 and below 1, so that sigma_s = sigma_s' / (1 - g): diffusion does without it, photons do not.
+    `thickness`: mm, above 0. The last layer of a stack may be infinitely thick. `g`: mean cosine of the
+    Henyey-Greenstein phase function, above -1 and below 1: sigma_s = sigma_s' / (1 - g). Diffusion models do not depend
+    on it; photons do. Raises InputError for other values.
     """
 
     thickness: float = math.inf
@@ -99,12 +103,15 @@ class Layer(Medium):
 
     @property
     def sigma_s(self) -> Array:
-        """Scattering (3,) in 1/mm."""
+        """Scattering coefficient (3,), 1/mm."""
         return self.sigma_s_prime / (1.0 - self.g)
 
 
 def stack(layers: Sequence[Layer]) -> tuple[Layer, ...]:
-    """A stack from the top down. Raises InputError if it is empty, or goes on below a layer without end."""
+    """Return layers, from the top down, as a tuple.
+
+    Raises InputError if there is none, if one is no `Layer`, or if one but the last is infinitely thick.
+    """
     if not layers:
         raise InputError("a stack needs at least one layer")
     for number, layer in enumerate(layers, start=1):
@@ -112,19 +119,21 @@ def stack(layers: Sequence[Layer]) -> tuple[Layer, ...]:
             raise InputError(f"layer {number} must be a Layer, not {layer!r}")
     for number, layer in enumerate(layers[:-1], start=1):
         if math.isinf(layer.thickness):
-            raise InputError(f"layer {number} has no end: there cannot be a layer {number + 1} below it")
+            raise InputError(f"layer {number} is infinitely thick: there cannot be a layer {number + 1} below it")
     return tuple(layers)
 
 
 def check_index(name: str, eta: object) -> None:
-    """Raises InputError unless a refractive index relative to air is one that the polynomials of `fresnel` cover."""
+    """Raise InputError unless `eta` is a number from 1 to 3, the indices that the polynomials of `fresnel` cover."""
     if not (is_number(eta) and 1.0 <= eta <= 3.0):  # type: ignore[operator]
         raise InputError(f"{name} must be a number from 1 to 3, not {shown(eta)}")
 
 
 def coefficients(name: str, values: object, low: float, high: float, unit: str = "", *, above: bool = False) -> Array:
-    """Three numbers from `low` to `high`, read-only; `above` leaves out `low`. Raises InputError, naming the channel,
-    the range and the value."""
+    """Return three numbers from `low` to `high` as a read-only array (3,). With `above`, `low` itself is not allowed.
+
+    Raises InputError, naming the channel, the range and the value.
+    """
     try:
         array = array_of(values)
     except ValueError:

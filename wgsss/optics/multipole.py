@@ -1,4 +1,4 @@
-"""Diffusion profiles of a slab: a dipole mirrored again and again in the slab's two boundaries."""
+"""Diffusion profiles of a slab: a dipole and its mirror images in the two boundaries of the slab."""
 
 from __future__ import annotations
 
@@ -20,26 +20,29 @@ from wgsss.values import is_number
 
 Array = NDArray[np.float64]
 
-# Images i and -i almost cancel; without absorption such pairs fall off as 1/i^3. Those beyond this one are summed by
-# Euler and Maclaurin: the integral from n + 1/2, and for its derivatives there differences of the pairs n - 1 to n + 2.
+# Images i and -i almost cancel; without absorption these pairs fall off as 1/i^3. Pairs beyond this index n are summed
+# by the Euler-Maclaurin formula: their integral from n + 1/2 on, and its derivatives there as differences of the pairs
+# n - 1 to n + 2.
 _MOST_IMAGES = 32
 _END = np.array([0.0, -1.0, 1.0, 0.0]) / 24.0 - np.array([-1.0, 3.0, -3.0, 1.0]) * 17.0 / 5760.0 + [1.0, 1.0, 0.0, 0.0]
-# From where modes take over: there the second falls off by e^-2 more than the first, and 20 reach rounding.
+# Modes are used from the distance on where the second mode has fallen off by a factor e^-_DECAY more than the first.
+# There _MODES modes reach the accuracy of rounding.
 _DECAY, _MODES = 2.0, 20
 
 
 @dataclass(frozen=True, eq=False)
 class Multipole(Medium, Profile):
-    """A slab under air, lit from above: what leaves at its top and at its bottom (004 eq. 31, 32; Contini et al. 1997).
+    """A slab under air, lit from above.
 
-    `thickness`: mm, finite and above the mean free path in every channel, as the real source lies that deep.
-    `eta_below`: index of what lies below, relative to air, 1 to 3. Where it is near the slab's, whose bottom then
-    reflects little, the slab must be up to two mean free paths thick. Raises InputError, naming the channel and its
-    mean free path, for slabs that are thinner: their R or T would be negative somewhere.
+    `thickness`: mm, finite, and above the mean free path in every channel, since the real source lies at that depth.
+    `eta_below`: refractive index of the medium below, relative to air, 1 to 3. If it is near that of the slab, the
+    bottom reflects little, and the slab must be up to two mean free paths thick. Raises InputError, naming the channel
+    and its mean free path, for thinner slabs: their R or T would be negative somewhere.
 
-    The profile is what leaves at the top, `transmittance` what leaves at the bottom, per unit of flux that entered.
-    Both sums are good to a relative 1e-11 at all distances. Photons in a slab of fewer than four mean free paths, or of
-    a low albedo, leave in numbers 5 to 20 % different.
+    Source: Mikkelsen 2009, eq. 31 and 32; Contini et al. 1997. The profile is the light that leaves at the top, and
+    `transmittance` that at the bottom, per unit of flux that has entered. The relative error of both sums is 1e-11 at
+    all distances. In slabs thinner than four mean free paths, or with a low albedo, traced photons give values that
+    differ by 5 to 20 %.
     """
 
     _: KW_ONLY
@@ -65,21 +68,21 @@ class Multipole(Medium, Profile):
         return self.transmitted_spectrum(0.0)
 
     def spectrum(self, k: ArrayLike) -> Spectrum:
-        """Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
+        """Return the Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
 
         `k` may be complex, with a positive real part.
         """
         return slab_spectra(self, self.thickness, 1.0, self.eta_below, k).R_above
 
     def transmitted_spectrum(self, k: ArrayLike) -> Spectrum:
-        """Fourier transform of T over the plane: see `spectrum`."""
+        """Return the Fourier transform of T over the plane, as `spectrum` does for R."""
         return slab_spectra(self, self.thickness, 1.0, self.eta_below, k).T_down
 
     def reflectance(self, r: ArrayLike) -> Array:
         return self._reflected(_POINT, r)
 
     def transmittance(self, r: ArrayLike) -> Array:
-        """T(r) in 1/mm^2, (..., 3): what leaves at the bottom `r` (...) mm from straight below the entry."""
+        """Return T(r) in 1/mm^2, (..., 3): light that leaves at the bottom, `r` (...) mm from below the entry."""
         z0, _ = extrapolation(self, 1.0, self.eta_below)
         real, virtual = self.thickness - self.mean_free_path, self.thickness + self.mean_free_path + 2.0 * z0
         return self._radiated(_POINT, r, real, virtual, -1.0)
@@ -91,14 +94,16 @@ class Multipole(Medium, Profile):
         return self._reflected(_ALONG, np.abs(np.asarray(x, dtype=np.float64)))
 
     def _reflected(self, term: _Term, r: ArrayLike) -> Array:
+        """Return the sum of `term` over all sources, for the light that leaves at the top."""
         z0, _ = extrapolation(self, 1.0, self.eta_below)
         return self._radiated(term, r, self.mean_free_path, self.mean_free_path + 2.0 * z0, 1.0)
 
     def _radiated(self, term: _Term, r: ArrayLike, real: Array, virtual: Array, sign: float) -> Array:
-        """What the images of two sources send through a face that lies `real` and `virtual` (3,) mm from them.
+        """Return the light (..., 3) of two sources and all their images through a face at `r` (...) mm.
 
-        Near, a sum over the images, which cancel each other ever more farther out; there the same sum as modes
-        between the extrapolated boundaries (its Poisson sum), which fall off like exp(-r pi m / H) instead.
+        The face is `real` and `virtual` (3,) mm away from the two sources; `sign` is that of the virtual source. Near
+        the entry the images are summed. Far from it they cancel each other: there the same sum is computed over the
+        modes between the extrapolated boundaries (by Poisson's formula), which fall off as exp(-r pi m / H).
         """
         r = distances(r)
         z0, zs = extrapolation(self, 1.0, self.eta_below)
@@ -115,26 +120,32 @@ class Multipole(Medium, Profile):
 
 
 class _Term(NamedTuple):
-    """What is summed: of a source, of its tail of images (by `z`), and of a mode that falls off like K_0(s r)."""
+    """What is summed: the light at a point, that beyond a radius, or that along a line."""
 
     source: Callable[..., Array]
+    """of one source"""
     tail: Callable[..., Array]
+    """the integral over the images beyond a depth"""
     mode: Callable[[Array, Array], Array]
+    """of one mode, which falls off as K_0(s r)"""
 
 
 def _mode(s: Array, r: Array) -> Array:
+    """Return a mode at distance `r`."""
     from scipy.special import k0
 
     return k0(s * r)
 
 
 def _mode_beyond(s: Array, r: Array) -> Array:
+    """Return the integral of a mode over the plane outside a circle of radius `r`."""
     from scipy.special import k1
 
     return 2.0 * np.pi * r * k1(s * r) / s
 
 
 def _mode_along(s: Array, x: Array) -> Array:
+    """Return the integral of a mode along a line at distance `x`."""
     return np.pi * np.exp(-s * x) / s
 
 
@@ -144,10 +155,10 @@ _ALONG = _Term(sources.flux_along, sources.fluence_pair_along, _mode_along)
 
 
 def _images(term: _Term, sigma_tr: float, z: float, H: float, r: Array, reach: float) -> Array:
-    """The sum over all i of the flux of a source at `z` + 2 H i, 0 < `z` < 2 H, at `r` (n,) up to `reach`."""
+    """Return the sum over all i of the flux of a source at `z` + 2 H i, 0 < `z` < 2 H, at `r` (n,) up to `reach`."""
     period = 2.0 * H
     n = _MOST_IMAGES
-    if sigma_tr > 0.0:  # fewer where exp(-36) of the light is left at `reach`
+    if sigma_tr > 0.0:  # fewer suffice: absorption leaves less than exp(-36) of the light of farther images
         n = min(n, 3 + math.ceil(math.sqrt((36.0 / sigma_tr) ** 2 + 72.0 * reach / sigma_tr) / period))
     offsets = period * np.arange(1.0, n + 3.0)[:, None]
     weights = np.ones(n + 2)
@@ -158,7 +169,7 @@ def _images(term: _Term, sigma_tr: float, z: float, H: float, r: Array, reach: f
 
 
 def _modes(term: _Term, sigma_tr: float, z: float, H: float, r: Array, reach: float) -> Array:
-    """The sum of `_images` over the modes sin(m pi z / H), at `r` (n,) beyond `reach`."""
+    """Return the same sum as `_images`, over the modes sin(m pi z / H), at `r` (n,) beyond `reach`."""
     m = np.arange(1.0, _MODES + 1.0)
     weights = m * np.sin(np.pi * m * z / H) / (2.0 * H * H)
     return weights @ term.mode(np.hypot(sigma_tr, np.pi * m / H)[:, None], r)

@@ -1,4 +1,4 @@
-"""Fourier transforms of what a slab reflects and lets through, in closed form."""
+"""Fourier transforms of the reflectance and the transmittance of a slab, in closed form."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ Spectrum = NDArray[Any]  # floats at real frequencies, complex numbers at comple
 
 
 class SlabSpectra(NamedTuple):
-    """Fourier transforms (..., 3) of a slab's R and T, lit from above (R+, T+ in 004) and from below (R-, T-).
+    """Fourier transforms (..., 3) of the R and T of a slab that is lit from above and from below.
 
-    T differs between the two wherever the boundaries do: the source is a mean free path below the lit face.
+    Mikkelsen 2009 calls them R+, T+ and R-, T-. T+ and T- differ if the boundaries do, since the source lies one mean
+    free path below the lit face.
     """
 
     R_above: Spectrum
@@ -28,11 +29,14 @@ class SlabSpectra(NamedTuple):
 
 
 def slab_spectra(medium: Medium, thickness: float, above: float, below: float, k: ArrayLike) -> SlabSpectra:
-    """The transforms of a finite slab between media of indices `above` and `below`, at `k` (...) in 1/mm.
+    """Return the transforms of a finite slab between media of indices `above` and `below`, at `k` (...) in 1/mm.
 
-    R = alpha' cosh(q z0) sinh(q (s + zs - l)) / sinh(q H) and T = alpha' cosh(q zs) sinh(q (l + z0)) / sinh(q H) from
-    above, with q^2 = sigma_tr^2 + k^2, s the thickness, l the mean free path, z0 and zs as of `extrapolation` and
-    H = s + z0 + zs: the geometric series of the images. Written in exponentials that fall.
+    The geometric series of the images has the sums, for light from above,
+
+        R = alpha' cosh(q z0) sinh(q (s + zs - l)) / sinh(q H)        T = alpha' cosh(q zs) sinh(q (l + z0)) / sinh(q H)
+
+    with q^2 = sigma_tr^2 + k^2, the thickness s, the mean free path l, z0 and zs as in `extrapolation`, and
+    H = s + z0 + zs. They are computed from falling exponentials, which cannot overflow.
     """
     q = decay(medium, k)
     z0, zs = extrapolation(medium, above, below)
@@ -49,19 +53,25 @@ def slab_spectra(medium: Medium, thickness: float, above: float, below: float, k
 
 
 def decay(medium: Medium, k: ArrayLike) -> Spectrum:
-    """q (..., 3) in 1/mm: how light of angular frequency `k` (...) falls off with depth, real part not negative."""
+    """Return q (..., 3) in 1/mm: light of angular frequency `k` (...) falls off with depth z as exp(-q z).
+
+    Its real part is not negative.
+    """
     q = np.sqrt(np.square(medium.sigma_tr) + np.square(np.asarray(k))[..., None])
-    return np.where(q == 0.0, 1e-150, q)  # the limit of ratios of sinh
+    return np.where(q == 0.0, 1e-150, q)  # ratios of sinh then have their limit for q to 0
 
 
 def extrapolation(medium: Medium, above: float, below: float) -> tuple[Array, Array]:
-    """Distances 2 A D (3,) in mm beyond a slab's two faces at which its fluence is 0, from its neighbours' indices."""
+    """Return the distances z0 and zs = 2 A D (3,), mm, beyond the two faces of a slab at which its fluence is 0.
+
+    `above` and `below` are the refractive indices of the neighbours.
+    """
     z0, zs = (2.0 * fresnel.boundary(medium.eta / eta) * medium.diffusion for eta in (above, below))
     return z0, zs
 
 
 def check_thickness(medium: Medium, thickness: float, name: str) -> None:
-    """Raises InputError unless a slab is thicker than its mean free path in every channel."""
+    """Raise InputError unless a slab is thicker than its mean free path in every channel."""
     for channel, length in zip(CHANNELS, medium.mean_free_path, strict=True):
         if not thickness > length:
             raise InputError(
@@ -70,9 +80,10 @@ def check_thickness(medium: Medium, thickness: float, name: str) -> None:
 
 
 def check_alone(medium: Medium, thickness: float, eta_below: float) -> None:
-    """Raises InputError where a slab under air would reflect a negative amount far from the light's entry.
+    """Raise InputError if the reflectance of a slab under air would be negative far from the point of entry.
 
-    There the fluence is half a sine between the extrapolated boundaries, and falls towards the top only above its peak.
+    There the fluence is half a sine between the extrapolated boundaries. It falls off towards the top only if its peak
+    is below the top.
     """
     above, below = extrapolation(medium, 1.0, eta_below)
     for channel, length, least in zip(CHANNELS, medium.mean_free_path, above - below, strict=True):

@@ -1,4 +1,4 @@
-"""Profiles given as a table: measured, or made elsewhere."""
+"""Profiles given as a table, which was measured or computed elsewhere."""
 
 from __future__ import annotations
 
@@ -23,22 +23,25 @@ Array = NDArray[np.float64]
 
 _COLUMNS = ("r", *(f"R of {channel}" for channel in CHANNELS))
 
-# Between the entries R^(1/16) is interpolated over the root of r, in which profiles bend little: an exponential or a
-# power of r, from 64 entries over four decades, comes back within 0.2 %. Unlike log R over log r it has a place for 0.
+# R^(1/16) is interpolated over the square root of r, in which profiles are nearly straight: an exponential or a power
+# of r, from 64 entries over four decades, is reproduced within 0.2 %. Unlike log R over log r, it allows R = 0 and r =
+# 0.
 _ROOT = 16
 
-_DENSEST = 1e18  # 1/mm^2: of R
+_LARGEST_R = 1e18  # 1/mm^2
 _MOST_ROWS = 10_000
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(26)  # per interval; exact for r R dr, of degree 51 in the root of r
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
+    26
+)  # in each interval; exact for r R dr, a polynomial of degree 51 in the root of r
 
 
 @dataclass(frozen=True, eq=False)
 class Tabulated(Profile):
-    """R(r) through the entries of a table, monotone between neighbours and so never negative.
+    """R(r) interpolated in a table. It is monotone between neighbouring entries, and so never negative.
 
-    `r`: (n,) in mm, ascending from 0 or more, n at least 2. `R`: (n, 3) in 1/mm^2, at least 0. Before the first entry
-    R is constant, after the last it is 0: the total is that of the table. Raises InputError for anything else.
+    `r` (n,): mm, at least 0, ascending, n at least 2. `R` (n, 3): 1/mm^2, at least 0. Below the first distance R is
+    constant, beyond the last one it is 0. Raises InputError for other values.
     """
 
     r: Array
@@ -57,15 +60,17 @@ class Tabulated(Profile):
         object.__setattr__(self, "R", R)
         for channel, total in zip(CHANNELS, self.total.tolist(), strict=True):
             if not total <= MOST_TOTAL:
-                found = f"{total:.3g} times the light in all, and may give {MOST_TOTAL:g} times at most"
-                raise InputError(f"R of {channel} gives back {found} (r is in mm, R in 1/mm^2)")
+                raise InputError(
+                    f"the total of R of {channel} is {total:.3g}, and may be {MOST_TOTAL:g} at most "
+                    "(r is in mm, R in 1/mm^2)"
+                )
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
-        """From a CSV file of four columns: r in mm, then R of red, green and blue in 1/mm^2.
+        """Read a profile from a CSV file with four columns: r in mm, then R of red, green and blue in 1/mm^2.
 
-        One line of titles may come first; blank lines and what follows a # are skipped. Raises InputError, naming the
-        file, the line and the value, for a file that cannot be read or is no such table.
+        The first line may hold titles. Blank lines and text after a # are skipped. Raises InputError, naming the file,
+        the line and the value, if the file cannot be read or does not hold such a table.
         """
         path = Path(path)
         text = read_text(path, "a CSV file")
@@ -101,32 +106,33 @@ class Tabulated(Profile):
         return 2.0 * along.sum(axis=-2)
 
     def _ring(self, root: Array) -> Array:
-        """2 pi r R dr, by the root of r."""
+        """Return 2 pi r R dr for each step of the square root of r, at roots (...): (..., 3)."""
         return 4.0 * np.pi * root[..., None] ** 3 * self._curve(root) ** _ROOT
 
     @cached_property
     def _outside(self) -> Array:
-        """The integral of R over the plane outside of each entry (n, 3)."""
+        """The integral of R over the plane beyond each distance of the table (n, 3)."""
         root = np.sqrt(self.r)
         rings = _between(self._ring, root[:-1], root[1:])
         return np.append(np.cumsum(rings[::-1], axis=0)[::-1], np.zeros((1, 3)), axis=0)
 
     @cached_property
     def _curve(self) -> Any:
+        """R^(1/_ROOT) as a function of the square root of r."""
         from scipy.interpolate import PchipInterpolator
 
         return PchipInterpolator(np.sqrt(self.r), self.R ** (1.0 / _ROOT))
 
 
 def _between(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
-    """The integrals (..., 3) of f (...) -> (..., 3) from `a` (...) to `b` (...), between which f is smooth."""
+    """Return the integrals (..., 3) of f from `a` (...) to `b` (...). f maps (...) to (..., 3) and is smooth there."""
     half = 0.5 * (b - a)[..., None]
     values = f(a[..., None] + half * (1.0 + _NODES))
     return (values * (half * _WEIGHTS)[..., None]).sum(axis=-2)
 
 
 def _parse(text: str) -> tuple[list[int], Array]:
-    """The numbers (n, 4) of a CSV file, and the line of each row."""
+    """Return the line number of each row of a CSV file, and the numbers (n, 4)."""
     lines: list[int] = []
     rows: list[list[float]] = []
     titled = False
@@ -154,6 +160,7 @@ def _parse(text: str) -> tuple[list[int], Array]:
 
 
 def _number(cell: str) -> float | None:
+    """Return the number in a cell of the file; None if it is not a number."""
     try:
         return float(cell)
     except ValueError:
@@ -161,7 +168,7 @@ def _number(cell: str) -> float | None:
 
 
 def _check(r: Array, R: Array, place: Callable[[int], str]) -> None:
-    """Raise InputError, saying in which `place` of the table, for what is no profile."""
+    """Raise InputError if a table does not hold a profile. `place` describes where a row of it is, for the error."""
     if r.size < 2:
         raise InputError(f"a table of a profile needs at least 2 rows, not {r.size}")
     for i, distance in enumerate(r.tolist()):
@@ -169,8 +176,8 @@ def _check(r: Array, R: Array, place: Callable[[int], str]) -> None:
             raise InputError(f"r {place(i)} must be a number {span(0.0, LONGEST, unit='mm')}, not {distance:g}")
         if i and not r[i - 1] < distance:
             raise InputError(f"r must ascend: {distance:g} {place(i)} follows {r[i - 1]:g}")
-    for i, channel in np.argwhere(~((R >= 0.0) & (R <= _DENSEST))):
+    for i, channel in np.argwhere(~((R >= 0.0) & (R <= _LARGEST_R))):
         raise InputError(
-            f"R of {CHANNELS[channel]} {place(i)} must be a number {span(0.0, _DENSEST, unit='1/mm^2')}, "
+            f"R of {CHANNELS[channel]} {place(i)} must be a number {span(0.0, _LARGEST_R, unit='1/mm^2')}, "
             f"not {R[i, channel]:g}"
         )

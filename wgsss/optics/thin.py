@@ -1,4 +1,4 @@
-"""Thin media, through which light reaches the far side."""
+"""Profiles of thin media, through which light reaches the far side."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ Array = NDArray[np.float64]
 
 
 def blend(R: ArrayLike, T: ArrayLike, cosine: ArrayLike) -> Array:
-    """P(r) = (1 - t) R + t T with t = (1 - cosine) / 2 (004 section 3.1, after Donner and Jensen 2005), in 1/mm^2.
+    """Return P(r) = (1 - t) R + t T in 1/mm^2, (..., 3), with t = (1 - cosine) / 2.
 
-    `R` and `T` (..., 3): profiles at the straight distance between the points where light enters and leaves; `cosine`
-    (...): of the angle between their normals, -1 on opposite faces. A mesh has no thickness to take T for: use that of
-    a slab as thick as its thin parts are. Raises InputError for a cosine outside of -1 to 1.
+    `R` and `T` (..., 3): a reflectance and a transmittance profile at the straight distance between the points where
+    light enters and leaves, 1/mm^2. `cosine` (...): that of the angle between the normals there, -1 on opposite faces.
+    A mesh has no single thickness: take the T of a slab that is as thick as the thin parts of the mesh. Source:
+    Mikkelsen 2009, section 3.1, after Donner and Jensen 2005. Raises InputError for a cosine outside -1 to 1.
     """
     cosine = np.asarray(cosine, dtype=np.float64)
     outside = ~(np.abs(cosine) <= 1.0 + 1e-6)  # normals are rounded
