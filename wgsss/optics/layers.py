@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from wgsss.optics import hankel
 from wgsss.optics.medium import Layer, check_index, stack
-from wgsss.optics.profile import Profile, distances, shares
+from wgsss.optics.profile import distances, shares
 from wgsss.optics.slab import (
     SlabSpectra,
-    Spectrum,
+    SpectralProfile,
     check_alone,
     check_thickness,
     decay,
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Layers(Profile):
+class Layers(SpectralProfile):
     """A stack of layers under air, lit from above.
 
     `layers`: from the top down. Each layer of finite thickness must be thicker than its mean free path in every
@@ -55,26 +55,6 @@ class Layers(Profile):
         if len(self.layers) == 1:
             check_alone(self.layers[0], self.layers[0].thickness, self.eta_below)
 
-    @property
-    def total(self) -> Array:
-        return self.spectrum(0.0)
-
-    @property
-    def total_transmittance(self) -> Array:
-        """T_tot (3,): the integral of T over the plane; 0 if the last layer is infinitely thick."""
-        return self.transmitted_spectrum(0.0)
-
-    def spectrum(self, k: ArrayLike) -> Spectrum:
-        """Return the Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
-
-        `k` may be complex, with a positive real part.
-        """
-        return self._spectra(k).R_above
-
-    def transmitted_spectrum(self, k: ArrayLike) -> Spectrum:
-        """Return the Fourier transform of T over the plane, as `spectrum` does for R."""
-        return self._spectra(k).T_down
-
     def reflectance(self, r: ArrayLike) -> Array:
         return np.maximum(hankel.plane(self.spectrum, self._resolved(r)), 0.0)
 
@@ -93,8 +73,7 @@ class Layers(Profile):
         """Return distances (...), mm, of at least 1e-5 mean free paths: nearer, profiles are constant."""
         return np.maximum(distances(r), 1e-5 * min(layer.mean_free_path.min() for layer in self.layers))
 
-    def _spectra(self, k: ArrayLike) -> SlabSpectra:
-        """Return the transforms of the whole stack at `k` (...)."""
+    def spectra(self, k: ArrayLike) -> SlabSpectra:
         indices = [1.0, *(layer.eta for layer in self.layers), self.eta_below]
         joined, *others = (
             _layer_spectra(layer, above, below, k)

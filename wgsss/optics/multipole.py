@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from wgsss.errors import InputError
 from wgsss.optics import sources
 from wgsss.optics.medium import LONGEST, Medium, check_index
-from wgsss.optics.profile import Profile, distances, shares
-from wgsss.optics.slab import Spectrum, check_alone, check_thickness, extrapolation, slab_spectra
+from wgsss.optics.profile import distances, shares
+from wgsss.optics.slab import SlabSpectra, SpectralProfile, check_alone, check_thickness, extrapolation, slab_spectra
 from wgsss.text import shown
 from wgsss.values import is_number
 
@@ -31,7 +31,7 @@ _DECAY, _MODES = 2.0, 20
 
 
 @dataclass(frozen=True, eq=False)
-class Multipole(Medium, Profile):
+class Multipole(Medium, SpectralProfile):
     """A slab under air, lit from above.
 
     `thickness`: mm, finite, and above the mean free path in every channel, since the real source lies at that depth.
@@ -58,25 +58,8 @@ class Multipole(Medium, Profile):
         check_thickness(self, self.thickness, "thickness")
         check_alone(self, self.thickness, self.eta_below)
 
-    @property
-    def total(self) -> Array:
-        return self.spectrum(0.0)
-
-    @property
-    def total_transmittance(self) -> Array:
-        """T_tot (3,): the integral of T over the plane."""
-        return self.transmitted_spectrum(0.0)
-
-    def spectrum(self, k: ArrayLike) -> Spectrum:
-        """Return the Fourier transform of R over the plane, (..., 3), at angular frequencies `k` (...) in 1/mm.
-
-        `k` may be complex, with a positive real part.
-        """
-        return slab_spectra(self, self.thickness, 1.0, self.eta_below, k).R_above
-
-    def transmitted_spectrum(self, k: ArrayLike) -> Spectrum:
-        """Return the Fourier transform of T over the plane, as `spectrum` does for R."""
-        return slab_spectra(self, self.thickness, 1.0, self.eta_below, k).T_down
+    def spectra(self, k: ArrayLike) -> SlabSpectra:
+        return slab_spectra(self, self.thickness, 1.0, self.eta_below, k)
 
     def reflectance(self, r: ArrayLike) -> Array:
         return self._reflected(_POINT, r)

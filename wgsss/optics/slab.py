@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from wgsss.errors import InputError
 from wgsss.optics import fresnel
 from wgsss.optics.medium import CHANNELS, Medium
+from wgsss.optics.profile import Profile
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[Any]  # floats at real frequencies, complex numbers at complex ones
@@ -26,6 +28,33 @@ class SlabSpectra(NamedTuple):
     T_down: Spectrum
     R_below: Spectrum
     T_up: Spectrum
+
+
+class SpectralProfile(Profile):
+    """A profile of a slab or a stack of layers, whose Fourier transforms over the plane are known in closed form."""
+
+    @abstractmethod
+    def spectra(self, k: ArrayLike) -> SlabSpectra:
+        """Return the transforms of R and T (..., 3), for light from above and from below.
+
+        `k` (...): angular frequencies in 1/mm. They may be complex, with a positive real part.
+        """
+
+    @property
+    def total(self) -> Array:
+        return self.spectrum(0.0)
+
+    @property
+    def total_transmittance(self) -> Array:
+        return self.transmitted_spectrum(0.0)
+
+    def spectrum(self, k: ArrayLike) -> Spectrum:
+        """Return the Fourier transform of R over the plane, (..., 3), at `k` (...), as of `spectra`."""
+        return self.spectra(k).R_above
+
+    def transmitted_spectrum(self, k: ArrayLike) -> Spectrum:
+        """Return the Fourier transform of T over the plane, (..., 3), at `k` (...), as of `spectra`."""
+        return self.spectra(k).T_down
 
 
 def slab_spectra(medium: Medium, thickness: float, above: float, below: float, k: ArrayLike) -> SlabSpectra:

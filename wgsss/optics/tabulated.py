@@ -31,9 +31,8 @@ _ROOT = 16
 _LARGEST_R = 1e18  # 1/mm^2
 _MOST_ROWS = 10_000
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
-    26
-)  # in each interval; exact for r R dr, a polynomial of degree 51 in the root of r
+# For each interval: exact for r R dr, a polynomial of degree 51 in the square root of r.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(26)
 
 
 @dataclass(frozen=True, eq=False)
