@@ -6,7 +6,8 @@
 
 import package::units::{Area, Length, Number};
 
-const SHIFT: u32 = 15u; // low bits that are left out: 2^(23 - SHIFT) = 256 entries for each doubling of the squared distance
+// The number of low bits that are left out: 2^(23 - SHIFT) = 256 entries for each doubling of the squared distance.
+const SHIFT: u32 = 15u;
 
 // The entry of a positive number, such as a squared distance. Smaller numbers than the first entry's have entry 0.
 fn entry_of(number: Number, first_entry: u32) -> u32 {

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss import wgsl
-from wgsss.bake.environment import Divided, Prefiltered, divided, prefilter
+from wgsss.bake.environment import Prefiltered, SplitEnvironment, prefilter, split_environments
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
 from wgsss.bake.unwrap import RenderMesh, split, unwrap
@@ -99,9 +99,9 @@ class Stage:
         return [light for light in self.scene.lights if isinstance(light, EnvironmentLight)]
 
     @property
-    def environment(self) -> Divided:
+    def environment(self) -> SplitEnvironment:
         """The light of the environments: their suns, and the rest."""
-        return self.shared("divided", lambda: divided(self.environments()))
+        return self.shared("split environment", lambda: split_environments(self.environments()))
 
     @property
     def lights(self) -> list[Light]:

@@ -1,4 +1,4 @@
-"""The maps of an atlas: stretch against analytic maps, areas, clearance, and seams against surfaces that unfold."""
+"""Maps of the charts of an atlas: stretch, gradients, areas, clearance, and seams on developable surfaces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from atlases import TILTED, box, cylinder, icosphere, locate, sheet
 
 from wgsss import wgsl
 from wgsss.bake.charts import INSIDE, Charts, charts
-from wgsss.bake.seams import apply, find_seams
+from wgsss.bake.seams import apply_maps, find_seams
 from wgsss.bake.stretch import stretch
 from wgsss.bake.unwrap import RenderMesh, unwrap
 from wgsss.gpu import Gpu
@@ -26,7 +26,7 @@ MAPS = {
 
 
 class Baked:
-    """The charts of a mesh, read back."""
+    """The charts of a mesh, read back from the GPU."""
 
     def __init__(self, gpu: Gpu, mesh: Mesh, size: int) -> None:
         self.mesh, self.size = mesh, size
@@ -41,16 +41,16 @@ class Baked:
         self.gutter = (self.ids > 0) & ~self.inside
 
     def across(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the gutter texels: centres (N, 2), where their seams lead (N, 2), and the number of the seam (N,)."""
+        """Return the centres of gutter texels (N, 2), the points (N, 2) to which seams map them, and the seams (N,)."""
         row, column = np.nonzero(self.gutter)
         uv = np.stack([column + 0.5, row + 0.5], axis=-1) / self.size
         seam = self.ids[row, column].astype(int) - 1
-        return uv, apply(self.maps[seam], uv), seam
+        return uv, apply_maps(self.maps[seam], uv), seam
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_root_inverts_the_metric(gpu: Gpu, name: str) -> None:
-    """S (J^T J) S = I, with J the analytic derivative of position by texture coordinate."""
+def test_the_root_inverts_the_metric(gpu: Gpu, name: str) -> None:
+    """Check S (J^T J) S = I, where J is the analytic derivative of position by texture coordinate."""
     mesh = sheet(MAPS[name])
     J = TILTED[:2].T @ np.linalg.inv(MAPS[name])
     for S in stretch(mesh, unwrap(gpu, mesh)).root:
@@ -59,7 +59,7 @@ def test_root_inverts_the_metric(gpu: Gpu, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_gradients_turn_mm_into_texels(gpu: Gpu, name: str) -> None:
+def test_gradients_convert_mm_to_texels(gpu: Gpu, name: str) -> None:
     baked = Baked(gpu, sheet(MAPS[name]), 256)
     expected = 256 * MAPS[name] @ TILTED[:2]
     for got, want in ((baked.gradient_u, expected[0]), (baked.gradient_v, expected[1])):
@@ -68,7 +68,7 @@ def test_gradients_turn_mm_into_texels(gpu: Gpu, name: str) -> None:
 
 
 def test_gradients_lie_in_a_bent_surface(gpu: Gpu) -> None:
-    """Means over faces around a coarse cylinder are neither too short nor off its surface."""
+    """On a coarse cylinder, means over faces are neither too short nor out of the tangent plane."""
     baked = Baked(gpu, cylinder(radius=5, height=20, sides=12), 256)
     column = np.nonzero(baked.inside)[1]
     angle = 2 * np.pi * ((column + 0.5) / 256 - 0.1) / 0.8
@@ -88,8 +88,8 @@ def test_texel_areas_sum_to_the_area(gpu: Gpu) -> None:
         assert (1 / per_mm2[baked.inside]).sum() == pytest.approx(mesh.area, rel=0.01), mesh.name
 
 
-def test_clearance_is_a_tight_lower_bound(gpu: Gpu) -> None:
-    left, right = (sheet(np.eye(2) * 0.02, cells=2, center=(x, 0.5)) for x in (0.3, 0.7))  # they touch
+def test_the_clearance_is_a_tight_lower_bound(gpu: Gpu) -> None:
+    left, right = (sheet(np.eye(2) * 0.02, cells=2, center=(x, 0.5)) for x in (0.3, 0.7))  # the two charts touch
     positions = np.concatenate([left.positions, right.positions + np.array([0, 0, 50])])
     faces = np.concatenate([left.faces, right.faces + len(left.positions)])
     touching = Mesh(positions, faces, corner_uvs=np.concatenate([left.corner_uvs, right.corner_uvs]))
@@ -102,7 +102,7 @@ def test_clearance_is_a_tight_lower_bound(gpu: Gpu) -> None:
             assert distance - 1.5 < baked.gradient_u[i, j, 3] <= distance + 0.01
 
 
-def test_gutter_is_three_texels_wide(gpu: Gpu) -> None:
+def test_the_gutter_is_three_texels_wide(gpu: Gpu) -> None:
     baked = Baked(gpu, box(1), 256)
     seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
     row, column = np.nonzero(~baked.inside)
@@ -116,16 +116,16 @@ def test_gutter_is_three_texels_wide(gpu: Gpu) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_seams_fold_around_the_edges_of_a_box(gpu: Gpu, seed: int) -> None:
-    """A point h mm beyond the edge of a side is on the next side, h mm from the edge."""
+def test_seams_continue_around_the_edges_of_a_box(gpu: Gpu, seed: int) -> None:
+    """A point h mm beyond an edge of one side is mapped to the next side, h mm from the edge."""
     baked = Baked(gpu, box(seed, cells=2), 512)
     uv, to, seam = baked.across()
     seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
-    single = seam < len(seams.maps)  # around corners of the box two sides are crossed, and there is no one answer
+    single = seam < len(seams.maps)  # around corners of the box two seams are applied, and the result is not unique
     uv, to, seam = uv[single], to[single], seam[single]
     assert single.mean() > 0.8
     a, b = seams.ends[seam, 0], seams.ends[seam, 1]
-    # Just inside of the edge's middle is the chart that the texel is beside of; its affine map extends over the edge.
+    # A point just inside the middle of the edge is in the chart of the texel; its affine map extends over the edge.
     _, face = locate(baked.mesh, baked.render_mesh, 0.5 * (a + b) - 1e-4 * (to_left(b - a) * seams.outward[seam, None]))
     corners = baked.render_mesh.atlas.astype(float)[baked.render_mesh.faces[face]]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
@@ -145,8 +145,8 @@ def to_left(edge: np.ndarray) -> np.ndarray:
     return np.stack([-edge[:, 1], edge[:, 0]], axis=-1) / np.linalg.norm(edge, axis=1, keepdims=True)
 
 
-def test_cylinder_goes_around(gpu: Gpu) -> None:
-    """Beyond the seam the atlas goes on at the other end, in the same row; beyond the open rims it is mirrored."""
+def test_seams_continue_around_a_cylinder(gpu: Gpu) -> None:
+    """Beyond the seam the atlas continues at its other end, in the same row; beyond the open rims it is mirrored."""
     baked = Baked(gpu, cylinder(), 256)
     uv, to, _ = baked.across()
     left, right = uv[:, 0] < 0.1, uv[:, 0] > 0.9
@@ -163,43 +163,43 @@ def test_cylinder_goes_around(gpu: Gpu) -> None:
 
 @pytest.mark.parametrize("name", MAPS)
 def test_open_edges_mirror_the_surface(gpu: Gpu, name: str) -> None:
-    """The reflection is one of the surface, not of the atlas."""
+    """The reflection keeps distances on the surface, not in the atlas."""
     baked = Baked(gpu, sheet(MAPS[name]), 256)
     uv, to, seam = baked.across()
     back = np.linalg.inv(MAPS[name])
     here, there = (uv - 0.5) @ back.T, (to - 0.5) @ back.T  # mm
-    kept = seam < 16  # four edges of four cells
+    single = seam < 16  # four edges of four cells
     beyond = np.clip(here, -10, 10)
-    beside = kept & ((np.abs(here) > 10).sum(axis=1) == 1)
-    assert beside.sum() > 0.8 * kept.sum()
+    beside = single & ((np.abs(here) > 10).sum(axis=1) == 1)
+    assert beside.sum() > 0.8 * single.sum()
     np.testing.assert_allclose(there[beside], (2 * beyond - here)[beside], atol=2e-3)
 
 
 @pytest.mark.parametrize("make", [lambda: box(5), cylinder, lambda: icosphere(20, 3), lambda: sheet(MAPS["sheared"])])
-def test_there_and_back_is_the_identity_on_the_edge(gpu: Gpu, make: object) -> None:
+def test_a_seam_and_the_seam_back_are_the_identity_on_the_edge(gpu: Gpu, make: object) -> None:
     mesh = make()  # type: ignore[operator]
     render_mesh = unwrap(gpu, mesh)
     seams = find_seams(render_mesh, stretch(mesh, render_mesh).root)
     position = np.stack([locate(mesh, render_mesh, seams.ends[:, k])[0] for k in (0, 1)], axis=1)
     for share in (0.0, 0.3, 1.0):
         point = seams.ends[:, 0] + share * (seams.ends[:, 1] - seams.ends[:, 0])
-        there = apply(seams.maps, point)
-        # The seam back is the one whose ends are the same two positions, or the same seam at an open edge.
-        ends = np.stack([apply(seams.maps, seams.ends[:, k]) for k in (0, 1)], axis=1)
+        there = apply_maps(seams.maps, point)
+        # The seam back is the one between the same two positions; at an open edge it is the same seam.
+        ends = np.stack([apply_maps(seams.maps, seams.ends[:, k]) for k in (0, 1)], axis=1)
         gap = np.minimum(
             np.abs(seams.ends[None] - ends[:, None]).max(axis=(2, 3)),
             np.abs(seams.ends[None, :, ::-1] - ends[:, None]).max(axis=(2, 3)),
         )
         assert gap.min(axis=1).max() < 1e-6
-        np.testing.assert_allclose(apply(seams.maps[gap.argmin(axis=1)], there), point, atol=1e-6)
+        np.testing.assert_allclose(apply_maps(seams.maps[gap.argmin(axis=1)], there), point, atol=1e-6)
         np.testing.assert_allclose(
             locate(mesh, render_mesh, there)[0], position[:, 0] + share * (position[:, 1] - position[:, 0]), atol=1e-3
         )
 
 
 @pytest.mark.parametrize("size", [256, 512])
-def test_gutter_of_a_closed_surface_is_the_neighbouring_chart(gpu: Gpu, size: int) -> None:
-    """On a sphere in several charts, a gutter texel is as far from its chart's border on the surface as in the map."""
+def test_the_gutter_of_a_closed_surface_is_mapped_to_the_neighbouring_chart(gpu: Gpu, size: int) -> None:
+    """On a sphere, a gutter texel is mapped to a point as far from its chart on the surface as it is in the map."""
     baked = Baked(gpu, icosphere(20, 3), size)
     seams = find_seams(baked.render_mesh, stretch(baked.mesh, baked.render_mesh).root)
     uv, to, seam = baked.across()
@@ -218,7 +218,7 @@ def test_gutter_of_a_closed_surface_is_the_neighbouring_chart(gpu: Gpu, size: in
 
 
 @pytest.mark.parametrize("size", [64, 256])
-def test_every_gutter_texel_leads_into_a_chart(gpu: Gpu, size: int) -> None:
+def test_every_gutter_texel_is_mapped_into_a_chart(gpu: Gpu, size: int) -> None:
     thin = sheet(np.array([[0.04, 0], [0, 0.0004]]), center=(0.5, 32.5 / 64))  # one row of texels
     for mesh in (icosphere(20, 3), box(2), cylinder(), thin):
         baked = Baked(gpu, mesh, size)
@@ -231,7 +231,7 @@ def test_every_gutter_texel_leads_into_a_chart(gpu: Gpu, size: int) -> None:
         assert reached.all(), mesh.name
 
 
-def test_same_bits_every_time(
+def test_charts_have_the_same_bits_every_time(
     gpu: Gpu, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = Baked(gpu, box(1), 128)

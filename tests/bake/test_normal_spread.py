@@ -1,4 +1,4 @@
-"""How far a surface turns within a distance, against closed forms."""
+"""The largest angle between normals within a distance, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from wgsss.scene.shapes import sphere
 
 
 @pytest.mark.parametrize("distance", [5.0, 15.0, 45.0])
-def test_on_a_sphere_it_is_the_angle_of_the_chord(distance):
+def test_the_normal_spread_on_a_sphere_is_the_angle_of_the_chord(distance):
     ball = sphere(20.0, 4000)
     found = normal_spread(ball.positions, ball.normals, distance)
     exact = 2 * np.arcsin(min(distance / 40.0, 1.0))
-    assert exact * 0.7 <= found.min() and found.max() <= exact * 1.25 + 0.02  # points are taken together
+    assert exact * 0.7 <= found.min() and found.max() <= exact * 1.25 + 0.02  # near points are averaged
 
 
-def test_at_an_edge_it_is_that_of_the_edge_and_elsewhere_nothing():
+def test_the_normal_spread_at_an_edge_is_its_angle_and_0_elsewhere():
     """Two planes that meet at 90 degrees, on a grid of 1 mm."""
     t, s = (a.ravel() for a in np.meshgrid(np.arange(20.0), np.arange(20.0)))
     nothing = np.zeros_like(t)

@@ -1,4 +1,4 @@
-"""The octree over points: whether a walk meets each point once, whatever it skips."""
+"""The octree over points: a traversal meets each point once, whichever subtrees it skips."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wgsss.bake.octree import LEAF, Octree, octree
 
 
 def scattered(count: int) -> np.ndarray:
-    """Points on a bent sheet, a tenth of them at one place."""
+    """Return points on a bent sheet, a tenth of them at the same point."""
     u, v = np.random.default_rng(4).random((2, count))
     points = np.stack([u, v, 0.2 * np.sin(6 * u)], axis=1) * 30.0
     points[: count // 10] = points[-1]
@@ -25,7 +25,7 @@ def children(tree: Octree, k: int) -> list[int]:
 
 
 @pytest.mark.parametrize("count", [1, 2, LEAF, LEAF + 1, 700])
-def test_children_share_out_their_parents_points(count: int) -> None:
+def test_each_point_of_a_node_belongs_to_one_of_its_children(count: int) -> None:
     tree, order = octree(scattered(count))
     assert sorted(order) == list(range(count))
     assert tree.first[0] == 0 and tree.count[0] == count and tree.next[0] == len(tree.next)
@@ -42,7 +42,7 @@ def test_children_share_out_their_parents_points(count: int) -> None:
             assert tree.height[k] == 1 + tree.height[below].max()
 
 
-def test_a_walk_that_skips_at_random_meets_each_point_once() -> None:
+def test_a_traversal_that_skips_subtrees_at_random_meets_each_point_once() -> None:
     tree, _ = octree(scattered(500))
     random = np.random.default_rng(1)
     met = np.zeros(500, int)
@@ -55,7 +55,7 @@ def test_a_walk_that_skips_at_random_meets_each_point_once() -> None:
     assert (met == 1).all()
 
 
-def test_cells_are_cubes_of_halved_sides_and_cut_no_finer_than_needed() -> None:
+def test_cells_are_cubes_with_halved_sides_and_are_not_divided_further_than_needed() -> None:
     points = scattered(3000)[300:]
     tree, order = octree(points)
     points = points[order]
@@ -64,7 +64,7 @@ def test_cells_are_cubes_of_halved_sides_and_cut_no_finer_than_needed() -> None:
         inside = points[tree.first[k] : tree.first[k] + tree.count[k]]
         below = children(tree, k)
         assert 2 <= len(below) <= 8
-        # The smallest cell that holds the node: its children lie in different octants of it.
+        # The children of a node lie in different octants of the smallest cell that contains it.
         level = 0
         while (
             np.ptp(np.floor((inside - low) / side * 2 ** (level + 1)).clip(max=2 ** (level + 1) - 1), axis=0) == 0
@@ -78,7 +78,7 @@ def test_cells_are_cubes_of_halved_sides_and_cut_no_finer_than_needed() -> None:
     assert (tree.height[cells] == 1).all()
 
 
-def test_sums_and_least_values_are_those_of_the_points_below() -> None:
+def test_sums_and_least_values_are_those_of_the_points_of_the_node() -> None:
     tree, _ = octree(scattered(300))
     values = np.random.default_rng(2).normal(size=(300, 3))
     for k in range(len(tree.first)):

@@ -1,4 +1,4 @@
-"""Samples spread over a mesh: even, of the right area on each side, and moving with it."""
+"""Samples of a mesh: evenly spread, with the right area on each side."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def positions(mesh: Mesh, cloud: PointCloud) -> np.ndarray:
 @pytest.mark.parametrize(
     ("mesh", "spacing"), [(sphere(10.0, 800), 0.7), (sphere(10.0, 8000), 2.0), (slab(), 1.0), (ear(2000), 1.0)]
 )
-def test_samples_are_even_and_their_areas_are_the_mesh(mesh: Mesh, spacing: float) -> None:
+def test_samples_are_evenly_spread_and_their_areas_sum_to_that_of_the_mesh(mesh: Mesh, spacing: float) -> None:
     from scipy.spatial import KDTree
 
     cloud = point_cloud(mesh, spacing)
@@ -36,7 +36,7 @@ def test_samples_are_even_and_their_areas_are_the_mesh(mesh: Mesh, spacing: floa
     assert cloud.samples.barycentric.min() >= 0.0
     apart = KDTree(x).query(x, k=2)[0][:, 1]
     assert np.percentile(apart, 1) > 0.4 * spacing, "at random it is 0.06"
-    # Linear functions are summed almost as they are integrated.
+    # Sums of linear functions are near their integrals.
     corners = mesh.positions[mesh.faces].astype(np.float64)
     exact = 0.5 * np.linalg.norm(mesh.face_normals, axis=1) @ corners.mean(axis=1) / mesh.area
     np.testing.assert_allclose(area @ x / mesh.area, exact, atol=0.02 * spacing)
@@ -52,19 +52,19 @@ def test_both_sides_of_a_plate_thinner_than_the_spacing_have_their_own_samples()
     grid = np.stack(np.meshgrid(*[np.linspace(-9, 9, 60)] * 2), axis=-1).reshape(-1, 2)
     for side in (-1, 1):
         own = side * normal[:, 2] > 0.9
-        np.testing.assert_allclose(areas(plate, cloud)[own].sum(), 400.0, rtol=0.02)  # the rim's share counts
+        np.testing.assert_allclose(areas(plate, cloud)[own].sum(), 400.0, rtol=0.02)  # the area of the rim counts, too
         away = KDTree(positions(plate, cloud)[own][:, :2]).query(grid)[0]
         assert away.max() < 1.1
 
 
-def test_too_many_samples_are_fewer_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_samples_are_reduced_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST", 500)
     with pytest.warns(UserWarning, match="samples 0.32 mm apart are too many: 500 are used, 1.6 mm apart"):
         cloud = point_cloud(sphere(10.0, 500), 0.316)
     assert 450 < len(cloud.samples.face) <= 500
 
 
-def test_slivers_and_faces_without_an_area_do_no_harm() -> None:
+def test_slivers_and_faces_without_an_area_are_accepted() -> None:
     corners = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [5, 1e-5, 0], [10, 10, 0], [5, 0, 0]], np.float32)
     mesh = Mesh(corners, np.array([[0, 1, 2], [1, 4, 2], [0, 3, 1], [0, 5, 1], [0, 1, 2]]))
     cloud = point_cloud(mesh, 1.0)
@@ -72,7 +72,7 @@ def test_slivers_and_faces_without_an_area_do_no_harm() -> None:
     assert np.isfinite(positions(mesh, cloud)).all() and (areas(mesh, cloud) > 0).all()
 
 
-def test_a_mesh_without_an_area_is_refused() -> None:
+def test_a_mesh_without_an_area_raises_an_error() -> None:
     line = Mesh(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.float32), np.array([[0, 1, 2]]))
     with pytest.raises(InputError, match="no area"):
         point_cloud(line, 1.0)

@@ -1,4 +1,4 @@
-"""What rays meet, by each library that can cast them."""
+"""The faces that rays meet, by each library that can cast them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def sphere_points(count: int, seed: int) -> np.ndarray:
 
 
 @every_library
-def test_faces_are_met_from_both_sides_and_the_nearest_first(library: str) -> None:
+def test_rays_meet_faces_from_both_sides_and_the_nearest_first(library: str) -> None:
     sheet = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     caster = Caster(np.concatenate([sheet, sheet + np.array([0, 0, 2])]), np.arange(6).reshape(2, 3), library)
     origins = np.array([[0.2, 0.2, 5], [0.2, 0.2, 1], [0.2, 0.2, -3], [0.9, 0.9, 5], [0.2, 0.2, -1]])
@@ -36,7 +36,7 @@ def test_faces_are_met_from_both_sides_and_the_nearest_first(library: str) -> No
 
 
 @every_library
-def test_no_rays_meet_nothing(library: str) -> None:
+def test_an_empty_set_of_rays_is_accepted(library: str) -> None:
     caster, none = Caster(plane().positions, plane().faces, library), np.zeros((0, 3))
     assert len(caster.first(none, none)) == len(caster.blocked(none, none)) == 0
 
@@ -44,8 +44,8 @@ def test_no_rays_meet_nothing(library: str) -> None:
 @every_library
 @pytest.mark.parametrize("radius", [1e-4, 1.0, 1e6])
 @pytest.mark.parametrize("far", [0.0, 300.0])
-def test_neither_size_nor_place_matters(library: str, radius: float, far: float) -> None:
-    """From within a closed surface every ray meets it, where the direction says."""
+def test_the_size_and_the_position_of_a_mesh_do_not_matter(library: str, radius: float, far: float) -> None:
+    """From inside a closed surface, each ray meets the face in its direction."""
     mesh = ear(2000)
     offset = far * radius * np.array([1.0, -2.0, 3.0])
     size = float(np.ptp(mesh.bounds, axis=0).max())
@@ -60,7 +60,7 @@ def test_neither_size_nor_place_matters(library: str, radius: float, far: float)
 
 @both
 @pytest.mark.parametrize("mesh", [ear(4000), gyroid(vertices=6000)], ids=["ear", "gyroid"])
-def test_libraries_agree_but_at_edges(mesh: Mesh) -> None:
+def test_libraries_agree_except_at_edges(mesh: Mesh) -> None:
     random = np.random.default_rng(5)
     start = random.integers(0, len(mesh.positions), 40_000)
     side = random.choice([-1e-3, 1e-3], len(start))[:, None] * np.ptp(mesh.bounds, axis=0).max()
@@ -79,7 +79,7 @@ def test_libraries_agree_but_at_edges(mesh: Mesh) -> None:
 
 
 @both
-def test_what_is_baked_is_the_same_by_both(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_libraries_bake_the_same_thickness(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, profile = ear(1500), MATERIALS["marble"].profile
     found = []
     for name in INSTALLED:
@@ -89,7 +89,7 @@ def test_what_is_baked_is_the_same_by_both(monkeypatch: pytest.MonkeyPatch) -> N
     np.testing.assert_allclose(*found, atol=2e-3)
 
 
-def test_without_any_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_without_a_library_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rays, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="embreex or libigl"):
         Caster(plane().positions, plane().faces)

@@ -1,4 +1,4 @@
-"""What is baked has the same bits, however many threads numpy's BLAS may use."""
+"""Baked data have the same bits for any number of BLAS threads."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ make_method("integral", {"samples": 5000}).estimate(Stage(default_gpu(), ear), (
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """What is baked where BLAS has one thread, and two."""
+    """Bake with one and with two BLAS threads. Returns the two cache folders."""
     found = []
     for threads in ("1", "2"):
         folder = tmp_path_factory.mktemp(f"threads{threads}")
@@ -43,17 +43,17 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return found
 
 
-def test_every_kind_of_entry_is_tried(folders: list[Path]) -> None:
+def test_every_kind_of_cache_entry_is_baked(folders: list[Path]) -> None:
     source = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "wgsss").rglob("*.py"))
     kinds = set(re.findall(r'\bcached\(\s*"([^"]+)"', source))
     assert len(kinds) > 10
     made = {path.name.rsplit("-", 1)[0] for path in folders[0].iterdir()}
-    assert kinds - {"volume"} <= made  # volume is of numbers that Mitsuba makes
+    assert kinds - {"volume"} <= made  # the entries of volume are computed by Mitsuba
 
 
 def test_one_and_two_threads_bake_the_same_bits(folders: list[Path]) -> None:
     one, two = ({path.name: path for path in folder.iterdir()} for folder in folders)
-    assert one.keys() == two.keys()  # the names are made of what goes into the bakes
+    assert one.keys() == two.keys()  # file names are made of the inputs
     for name in one:
         with np.load(one[name]) as first, np.load(two[name]) as second:
             assert first.files == second.files

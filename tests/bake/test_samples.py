@@ -1,4 +1,4 @@
-"""Samples that stand for a surface's area."""
+"""Samples of a surface and their areas."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wgsss.stage import Stage
 
 
 @pytest.mark.parametrize("spacing", [50.0, 3.0, 0.7])
-def test_areas_sum_to_the_mesh_and_first_moments_are_kept(spacing: float) -> None:
+def test_areas_and_first_moments_are_those_of_the_mesh(spacing: float) -> None:
     ball = sphere(radius=10.0, vertices=500)
     samples = subdivided(ball, spacing)
     corners = ball.positions[ball.faces].astype(np.float64)

@@ -1,4 +1,4 @@
-"""How much of the sky is left: against closed forms of what hides it."""
+"""The visible share of the sky, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SKY = EnvironmentLight((1, 1, 1))
 
 
 def ball(height: float) -> Mesh:
-    """A ball of radius 5 mm about (0, height, 0)."""
+    """Return a ball of radius 5 mm around (0, height, 0)."""
     found = sphere(radius=5.0, vertices=4000)
     return Mesh(found.positions + np.array([0, height, 0], np.float32), found.faces, name="ball")
 
 
 def wall(x: float) -> Mesh:
-    """A wall without end, but for one towards y < 0 that no ray comes near."""
+    """Return a practically infinite wall. It ends only towards y < 0, where no ray gets."""
     corners = np.array([[x, -1e4, -1e4], [x, -1e4, 1e4], [x, 1e4, 1e4], [x, 1e4, -1e4]], np.float32)
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), name="wall")
 
@@ -39,7 +39,7 @@ def seen(found: Scene, x: tuple[float, float, float], n: np.ndarray = UP) -> flo
 
 @pytest.mark.parametrize("distance", [6.0, 10.0, 25.0])
 def test_a_ball_overhead_hides_its_form_factor(distance: float) -> None:
-    """(a / d)^2 of a ball straight above."""
+    """The form factor of a ball straight above is (a / d)^2."""
     assert seen(lit(SKY, mesh=ball(distance)), (0, 0, 0)) == pytest.approx(1 - (5.0 / distance) ** 2, abs=0.01)
 
 
@@ -48,15 +48,15 @@ def test_a_wall_hides_half() -> None:
     assert seen(lit(SKY, mesh=wall(5.0)), (7.0, 0, 0), np.array([[1.0, 0, 0]])) == 1.0
 
 
-def test_nothing_hides_from_a_convex_body_and_all_is_dark_inside(gpu: Gpu) -> None:
+def test_a_convex_body_sees_the_whole_sky_from_outside_and_none_from_inside(gpu: Gpu) -> None:
     scene = lit(SKY, mesh=ball(0.0))
     stage = Stage(gpu, scene)
     assert stage.bodies[0].sky.min() > 0.995
     assert seen(scene, (1, 0, 0)) == 0.0
 
 
-def test_what_is_hidden_counts_by_its_radiance(tmp_path: Path) -> None:
-    """A sky whose half x > 0 is three times as bright, and a wall that hides one of the halves."""
+def test_the_hidden_part_of_the_sky_is_weighted_by_its_radiance(tmp_path: Path) -> None:
+    """One half of the sky, x > 0, is three times as bright as the other, and a wall hides one half."""
     pixels = np.ones((32, 64, 3), np.float32)
     pixels[:, 32:] = 3.0
     file = write_environment(tmp_path / "sky.exr", pixels)
@@ -66,7 +66,7 @@ def test_what_is_hidden_counts_by_its_radiance(tmp_path: Path) -> None:
 
 
 def test_irradiance_of_the_sky_beside_a_ball(gpu: Gpu) -> None:
-    """L_d on the ground is pi times what the ball's form factor, (a / d)^2 cos, leaves of a constant sky."""
+    """L_d on the ground is pi (1 - F) times the radiance of the sky; F = (a / d)^2 cos is the ball's form factor."""
     scene = lit(SKY, mesh=plane(side=60.0, cells=60), extra=(Object(ball(12.0), MATTE),))
     for method in ("lambert", "deon07"):
         image = Renderer(scene, make_method(method), (41, 41), gpu).frame(aovs=["irradiance"])
@@ -76,8 +76,8 @@ def test_irradiance_of_the_sky_beside_a_ball(gpu: Gpu) -> None:
         np.testing.assert_allclose(image.aovs["irradiance"][20, [34, 37, 40], 1], wanted, rtol=0.01)
 
 
-def test_the_skys_reflection_is_hidden_likewise(gpu: Gpu) -> None:
-    """By the same share: what the ball's form factor leaves of it."""
+def test_the_reflection_of_the_sky_has_the_same_visible_share(gpu: Gpu) -> None:
+    """The share is 1 less the form factor of the ball."""
     ground = plane(side=60.0, cells=60)
     both = [
         Renderer(lit(SKY, mesh=ground, material=WHITE, extra=extra), make_method("lambert"), (41, 41), gpu)

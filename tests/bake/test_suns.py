@@ -1,4 +1,4 @@
-"""Suns of environment images: what they give, and that all else stays in the image."""
+"""Suns of environment images: their light, and the rest of the image."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scenes import MATTE, WHITE, lit, plane, write_environment
 
-from wgsss.bake.environment import divided, prefilter
-from wgsss.bake.suns import MOST_SUNS, directions, solid_angles, take_suns
+from wgsss.bake.environment import prefilter, split_environments
+from wgsss.bake.suns import MOST_SUNS, solid_angles, take_suns, texel_directions
 from wgsss.gpu import Gpu
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer
@@ -23,14 +23,14 @@ SUN = (1000.0, 800.0, 500.0)
 
 
 def with_sun(row: int, column: int, height: int = 128, sky: float = 0.0) -> np.ndarray:
-    """A sky with one texel of sun."""
+    """Return a sky with a sun of one texel."""
     pixels = np.full((height, 2 * height, 3), sky, np.float32)
     pixels[row, column] = SUN
     return pixels
 
 
 def softboxes(height: int = 128) -> np.ndarray:
-    """Two, one of them across the seam, that span 30 degrees."""
+    """Return two soft boxes of 30 degrees; one of them lies across the border of the image."""
     pixels = np.zeros((height, 2 * height, 3), np.float32)
     side = height // 6
     pixels[side : 2 * side, -side // 2 :] = pixels[side : 2 * side, : side // 2] = (20, 15, 10)
@@ -52,7 +52,7 @@ def tube() -> np.ndarray:
 
 
 def spread(count: int) -> np.ndarray:
-    """Directions all around, among them the poles."""
+    """Return directions in the whole sphere, including the poles."""
     i = np.arange(count) + 0.5
     y, phi = 1.0 - 2.0 * i / count, np.pi * (3.0 - np.sqrt(5.0)) * i
     ring = np.sqrt(1.0 - y * y)
@@ -60,16 +60,16 @@ def spread(count: int) -> np.ndarray:
 
 
 def irradiance(pixels: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """(N, 3) W/m^2: the integral of radiance and cosine, texel by texel."""
+    """Return the integral of radiance times cosine, summed over texels: (N, 3), W/m^2."""
     height, width = pixels.shape[:2]
     row, column = np.nonzero(pixels.any(axis=2))
     power = pixels[row, column] * solid_angles(height, width)[row, None]
-    return np.maximum(n @ directions(row, column, height, width).T, 0.0) @ power.astype(np.float64)
+    return np.maximum(n @ texel_directions(row, column, height, width).T, 0.0) @ power.astype(np.float64)
 
 
 def received(gpu: Gpu, light: EnvironmentLight, n: np.ndarray) -> np.ndarray:
-    """The same as it is rendered: from the prefiltered map, interpolated as the shaders do, and the suns."""
-    found = divided([light])
+    """Return the irradiance as rendered: of the suns, and of the prefiltered map as shaders interpolate it."""
+    found = split_environments([light])
     texels = gpu.read_texture(prefilter(gpu, found.rest, MATTE).irradiance).astype(np.float64)
     values = texels[..., :3] * texels[..., 3:] ** 2
     height, width = values.shape[:2]
@@ -89,19 +89,19 @@ def received(gpu: Gpu, light: EnvironmentLight, n: np.ndarray) -> np.ndarray:
     "place", [(60, 30), (40, 0), (40, 255), (0, 100), (127, 200), (3, 0), (63, 127)], ids=lambda place: f"{place}"
 )
 @pytest.mark.parametrize("sky", [0.0, 0.01])
-def test_a_texel_is_taken_out_as_a_light(place: tuple[int, int], sky: float) -> None:
+def test_a_bright_texel_becomes_a_light(place: tuple[int, int], sky: float) -> None:
     pixels = with_sun(*place, sky=sky)
     (sun,), rest = take_suns(pixels)
     np.testing.assert_allclose(rest, sky, rtol=1e-5, atol=1e-3)
-    np.testing.assert_allclose(sun.towards, directions(*place, 128, 256), atol=1e-6)
+    np.testing.assert_allclose(sun.towards, texel_directions(*place, 128, 256), atol=1e-6)
     np.testing.assert_allclose(sun.irradiance, (np.array(SUN) - sky) * solid_angles(128, 256)[place[0]], rtol=1e-5)
 
 
-def test_a_disc_and_its_glare_are_one_sun_about_their_middle() -> None:
+def test_a_disc_and_its_glare_are_one_sun_at_their_centre() -> None:
     height, width = 512, 1024
     row, column = np.meshgrid(np.arange(height), np.arange(width), indexing="ij")
-    centre = directions(150.3, 10.7, height, width)
-    angle = np.degrees(np.arccos(np.clip(directions(row, column, height, width) @ centre, -1.0, 1.0)))
+    centre = texel_directions(150.3, 10.7, height, width)
+    angle = np.degrees(np.arccos(np.clip(texel_directions(row, column, height, width) @ centre, -1.0, 1.0)))
     pixels = np.repeat((1e5 * (angle < 0.4) + 50.0 * np.exp(-angle))[..., None], 3, axis=2).astype(np.float32) + 1
     suns, rest = take_suns(pixels)
     assert len(suns) == 1
@@ -120,13 +120,13 @@ def test_a_disc_and_its_glare_are_one_sun_about_their_middle() -> None:
         (softboxes(), 0),
         (tube(), 0),
         (with_sun(2, 3, height=8), 0),  # 23 degrees wide
-        (with_sun(9, 9, sky=100.0), 0),  # too little to be seen
+        (with_sun(9, 9, sky=100.0), 0),  # too weak to be visible
         (bulbs(5), 5),
         (bulbs(12), MOST_SUNS),
     ],
     ids=["even", "black", "noise", "softboxes", "tube", "coarse", "faint", "5 bulbs", "12 bulbs"],
 )
-def test_only_what_is_small_and_bright_is_a_sun(pixels: np.ndarray, count: int) -> None:
+def test_only_small_and_bright_regions_are_suns(pixels: np.ndarray, count: int) -> None:
     suns, rest = take_suns(pixels)
     assert len(suns) == count
     light = (pixels - rest) * solid_angles(*pixels.shape[:2])[:, None, None]
@@ -139,8 +139,8 @@ def test_only_what_is_small_and_bright_is_a_sun(pixels: np.ndarray, count: int) 
     ids=["sun at the pole", "sun at the seam", "softboxes", "softboxes of another size", "tube", "bulbs"],
 )
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e8])
-def test_irradiance_is_that_of_the_image(gpu: Gpu, tmp_path: Path, pixels: np.ndarray, scale: float) -> None:
-    """Within 1 % of its largest value, for any normal, and beyond what half floats hold, too."""
+def test_the_irradiance_is_that_of_the_image(gpu: Gpu, tmp_path: Path, pixels: np.ndarray, scale: float) -> None:
+    """The error is below 1 % of the largest irradiance, for any normal, also beyond the range of half floats."""
     light = EnvironmentLight((scale,) * 3, write_environment(tmp_path / "sky.exr", pixels))
     n = spread(400)
     wanted = irradiance(pixels, n) * scale
@@ -150,7 +150,7 @@ def test_irradiance_is_that_of_the_image(gpu: Gpu, tmp_path: Path, pixels: np.nd
 
 
 @pytest.mark.parametrize("rotation", [90.0, 1.0, -37.5, 725.0])
-def test_the_image_and_its_suns_turn_alike(gpu: Gpu, tmp_path: Path, rotation: float) -> None:
+def test_the_image_and_its_suns_rotate_together(gpu: Gpu, tmp_path: Path, rotation: float) -> None:
     pixels = softboxes() + with_sun(40, 90)
     n, turn = spread(200), np.radians(rotation)
     file = write_environment(tmp_path / "sky.exr", pixels)
@@ -173,9 +173,9 @@ def test_irradiance_of_real_light_probes(gpu: Gpu, data: Path, name: str) -> Non
 
 @pytest.mark.parametrize("method", ["deon07", "sam"])
 def test_a_sun_in_an_image_lights_as_the_directional_light_does(gpu: Gpu, tmp_path: Path, method: str) -> None:
-    """M of a ball, with the shadow of another, to the last bit or nearly."""
+    """M of a ball, in the shadow of another ball, is the same up to rounding."""
     pixels = with_sun(30, 100)
-    towards, E = directions(30, 100, 128, 256), np.array(SUN) * solid_angles(128, 256)[30]
+    towards, E = texel_directions(30, 100, 128, 256), np.array(SUN) * solid_angles(128, 256)[30]
     camera = OrthographicCamera((0, 0, 50), (0, 0, 0), height=24)
     ball = sphere(radius=5.0, vertices=500)
     shown = []
@@ -192,7 +192,7 @@ def test_a_sun_in_an_image_lights_as_the_directional_light_does(gpu: Gpu, tmp_pa
 
 
 def test_the_shadow_of_a_sun_is_sharp(gpu: Gpu, tmp_path: Path) -> None:
-    """On the ground, dark where a ball stands between, lit elsewhere, however coarse the mesh of the ground."""
+    """The ground is dark where a ball hides the sun and lit elsewhere, however coarse its mesh is."""
     file = write_environment(tmp_path / "sky.exr", with_sun(32, 0))
     ball = Object(sphere(radius=3.0, vertices=4000), MATTE, translate=(0, 10, 0))
     camera = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=36)
@@ -201,17 +201,17 @@ def test_the_shadow_of_a_sun_is_sharp(gpu: Gpu, tmp_path: Path) -> None:
     t = (np.arange(121) + 0.5) / 121 * 36 - 18
     x, z = np.meshgrid(t, t)
     to_ball = np.stack([-x, np.full_like(x, 10.0), -z], axis=-1)
-    towards = directions(32, 0, 128, 256)
-    off = np.linalg.norm(np.cross(to_ball, towards), axis=-1)  # of the ray towards the sun, from the ball's middle
-    ground = np.where(np.hypot(x, z) > 3.2, image.aovs["irradiance"][..., 0], np.nan)  # but where the ball is seen
+    towards = texel_directions(32, 0, 128, 256)
+    off = np.linalg.norm(np.cross(to_ball, towards), axis=-1)  # of the ray from the centre of the ball
+    ground = np.where(np.hypot(x, z) > 3.2, image.aovs["irradiance"][..., 0], np.nan)  # without the ball
     E = SUN[0] * solid_angles(128, 256)[32] * towards[1]
     assert (off < 2.8).sum() > 100
     assert np.nanmax(ground[off < 2.8]) < 1e-3 * E
     np.testing.assert_allclose(np.nanmin(ground[off > 3.2]), E, rtol=0.01)
 
 
-def test_softboxes_light_a_body_smoothly(gpu: Gpu, tmp_path: Path) -> None:
-    """A convex body hides nothing from itself: all its vertices see what is above their horizon."""
+def test_the_light_of_soft_boxes_is_smooth_on_a_body(gpu: Gpu, tmp_path: Path) -> None:
+    """All vertices of a convex body see the whole sky above their horizon."""
     light = EnvironmentLight(file=write_environment(tmp_path / "sky.exr", softboxes()))
     stage = Stage(gpu, lit(light, mesh=sphere(radius=5.0, vertices=4000)))
     n = stage.bodies[0].render_mesh.normals.astype(np.float64)
@@ -221,7 +221,7 @@ def test_softboxes_light_a_body_smoothly(gpu: Gpu, tmp_path: Path) -> None:
 
 
 def test_suns_come_after_the_lights_of_the_scene(gpu: Gpu, tmp_path: Path) -> None:
-    """Methods find the emitters of lights by their place."""
+    """Methods identify the emitters of the lights by their index."""
     lamp = SphereLight((0, 90, 0), 5, (9, 9, 9), samples=4)
     sky = EnvironmentLight(file=write_environment(tmp_path / "sky.exr", bulbs(5)))
     stage = Stage(gpu, lit(sky, lamp))

@@ -1,4 +1,4 @@
-"""Local thickness against closed forms, chords cast by other means, and chord lengths."""
+"""Local thickness, compared with closed forms, with independently cast chords, and with chord lengths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from scipy.stats import spearmanr
 
 from wgsss.bake import thickness
 from wgsss.bake.rays import Caster
-from wgsss.bake.thickness import falloff, far_side, local_thickness, smoothed, table
+from wgsss.bake.thickness import falloff, falloff_table, far_side, local_thickness, smoothed
 from wgsss.optics import Profile, SumOfGaussians
 from wgsss.scene import MATERIALS, Mesh, load_mesh
 from wgsss.scene.shapes import ear, slab, sphere
@@ -31,8 +31,8 @@ def gaussian(variance: float) -> Profile:
 
 @pytest.mark.parametrize("profile", [MARBLE, SKIN1, SKIN])
 @pytest.mark.parametrize("height", [0.3, 2.0])
-def test_rays_through_a_plate_sum_to_what_the_profile_has_beyond(profile: Profile, height: float) -> None:
-    """The integral equation that the falloff solves."""
+def test_the_mean_over_rays_through_a_plate_is_the_share_beyond_its_thickness(profile: Profile, height: float) -> None:
+    """Check the integral equation that the falloff solves."""
 
     def seen(cos: float) -> Any:
         return 2.0 * cos * falloff(profile, np.array(height / cos))
@@ -43,7 +43,7 @@ def test_rays_through_a_plate_sum_to_what_the_profile_has_beyond(profile: Profil
 
 @pytest.mark.parametrize("profile", [MARBLE, SKIN, gaussian(1.0)])
 def test_the_falloff_falls_from_1_to_0(profile: Profile) -> None:
-    distances, falls = table(profile)
+    distances, falls = falloff_table(profile)
     lit = profile.total > 0.0
     np.testing.assert_allclose(falls[0, lit], 1.0, atol=1e-3)
     assert (np.diff(falls, axis=0) <= 1e-12).all() and (falls[-1] < 0.02).all() and (falls >= 0.0).all()
@@ -52,18 +52,18 @@ def test_the_falloff_falls_from_1_to_0(profile: Profile) -> None:
 
 
 @pytest.mark.parametrize("profile", [MARBLE, SKIN1])
-def test_a_plate(profile: Profile) -> None:
-    """The share of the profile beyond its thickness."""
+def test_the_local_thickness_of_a_plate(profile: Profile) -> None:
+    """It is the share of the profile beyond the thickness of the plate."""
     plate = slab((400.0, 400.0, 2.0), vertices=2500)
     found = local_thickness(plate, profile)[(np.abs(plate.positions[:, :2]) < 100.0).all(axis=1)]
     assert len(found) > 100
-    # rays farther out than the profile's range are cut off
+    # rays longer than the range of the profile are cut off
     np.testing.assert_allclose(found, np.broadcast_to(profile.beyond(2.0), found.shape), rtol=0.01, atol=2e-3)
 
 
 @pytest.mark.parametrize("radius", [0.7, 1.5])
-def test_a_ball(radius: float) -> None:
-    """Chords are 2 r cos long, and those longer than sqrt(2) r end where the surface faces away."""
+def test_the_local_thickness_of_a_ball(radius: float) -> None:
+    """Chords have the length 2 r cos. Those longer than sqrt(2) r end where the surface faces away."""
     found = local_thickness(sphere(radius=radius, vertices=4000), gaussian(1.0))
 
     def below(q: float) -> float:  # the integral of exp(-q) (1 + q), q = d^2 / 2v
@@ -75,7 +75,7 @@ def test_a_ball(radius: float) -> None:
     assert (found[:, 2] == 0.0).all()
 
 
-def test_lengths_scale() -> None:
+def test_scaling_mesh_and_material_keeps_the_local_thickness() -> None:
     small = ear(1000)
     large = Mesh(3.0 * small.positions, small.faces)
     np.testing.assert_allclose(
@@ -83,12 +83,12 @@ def test_lengths_scale() -> None:
     )
 
 
-def test_what_has_no_far_side_lets_nothing_through() -> None:
+def test_a_surface_without_a_far_side_lets_no_light_through() -> None:
     assert (local_thickness(plane(), MARBLE) == 0.0).all()
 
 
-def test_nothing_comes_from_where_a_hole_is() -> None:
-    """A plate whose far side is only there for x < 0: what lies over the edge has half of a plate's."""
+def test_no_light_comes_through_a_hole() -> None:
+    """The far side of a plate ends at x = 0: above its edge, half of the light of a plate remains."""
     plate = slab((60.0, 60.0, 2.0), vertices=6000)
     middle = plate.positions[plate.faces].mean(axis=1)
     kept = (np.abs(plate.face_normals[:, 2]) > 0) & ((middle[:, 2] > 0) | (middle[:, 0] < 0))
@@ -102,8 +102,8 @@ def test_nothing_comes_from_where_a_hole_is() -> None:
 
 
 @pytest.mark.parametrize("name", ["ear", "bunny"])
-def test_chords_of_random_rays(name: str, data: Path) -> None:
-    """Against rays that are random, cast one after another through all that they meet."""
+def test_the_mean_over_random_rays_is_the_same(name: str, data: Path) -> None:
+    """Compare with random rays that are cast one after another, from face to face."""
     mesh, vertices, d, normals = chords(name, data)
     found = at(mesh, vertices)
     opposed = np.einsum("nrk,nk->nr", normals, mesh.normals[vertices]) < 0.0
@@ -116,11 +116,14 @@ def test_chords_of_random_rays(name: str, data: Path) -> None:
 
 @pytest.mark.parametrize(("name", "median", "lowest"), [("ear", 1.3, 0.8), ("bunny", 1.8, 0.8)])
 def test_thickness_and_chord_length(name: str, median: float, lowest: float, data: Path) -> None:
-    """A plate of thickness h has chords of 2 h in the mean, and lets the share beyond h through. What comes through at
-    a vertex is thus a plate's, whose mean chord is the same as the true one for plates. Where rays run along the
-    surface, which count for nothing, it is larger: by a third on the ear, 1.8 times on a bunny."""
+    """A plate of thickness h has a mean chord of 2 h, and lets the share of the profile beyond h pass.
+
+    The local thickness at a vertex thus implies a mean chord: that of the plate with the same share. It is the true one
+    on plates. It is larger where rays run along the surface, since these are not counted: 1.3 times on the ear, 1.8
+    times on the bunny.
+    """
     mesh, vertices, d, _ = chords(name, data)
-    if name == "ear":  # Cauchy: over a closed surface, chords are four volumes over the area in the mean
+    if name == "ear":  # Cauchy: the mean chord of a closed surface is four times its volume over its area
         volume = np.einsum("nk,nk->", mesh.positions[mesh.faces[:, 0]].astype(float), mesh.face_normals) / 6.0
         areas = np.bincount(mesh.faces.ravel(), np.repeat(np.linalg.norm(mesh.face_normals, axis=1) / 6.0, 3))
         assert np.average(d.mean(axis=1), weights=areas[vertices]) == pytest.approx(4 * volume / mesh.area, rel=0.05)
@@ -134,7 +137,7 @@ def test_thickness_and_chord_length(name: str, median: float, lowest: float, dat
 
 
 def at(mesh: Mesh, vertices: Any) -> Any:
-    """The local thickness (N, 3) of marble at some vertices of a mesh, not smoothed."""
+    """Return the local thickness (N, 3) of marble at some vertices of a mesh, before smoothing."""
     lengths = far_side(Caster(mesh.positions, mesh.faces), mesh, vertices)
     return (falloff(MARBLE, np.minimum(lengths, 1e6)) * np.isfinite(lengths)[..., None]).mean(axis=1)
 
@@ -150,7 +153,8 @@ def chords(name: str, data: Path) -> tuple[Mesh, Any, Any, Any]:
     vertices = random.choice(len(mesh.positions), 300, replace=False)
     n = mesh.normals[vertices].astype(np.float64)
     w = random.normal(size=(len(n), 300, 3))
-    w = w / np.linalg.norm(w, axis=2, keepdims=True) - n[:, None]  # on a ball that touches the surface: the cosine's
+    # Points on a ball that touches the surface have a cosine density as directions.
+    w = w / np.linalg.norm(w, axis=2, keepdims=True) - n[:, None]
     w = (w / np.linalg.norm(w, axis=2, keepdims=True)).reshape(-1, 3)
     start = np.repeat(mesh.positions[vertices] - 1e-3 * n, 300, axis=0)
     face = Caster(mesh.positions, mesh.faces).first(start, w)
@@ -160,8 +164,8 @@ def chords(name: str, data: Path) -> tuple[Mesh, Any, Any, Any]:
     return mesh, vertices, d.reshape(-1, 300), normals.reshape(-1, 300, 3)
 
 
-def test_smoothing_keeps_the_integral_and_takes_means() -> None:
-    """The integral over the surface of what is drawn stays; one vertex of a plane's grid keeps half of its value."""
+def test_smoothing_keeps_the_integral() -> None:
+    """The integral over the surface stays. A vertex of a regular grid keeps half of its value in each smoothing."""
     mesh = ear(800)
     values = np.random.default_rng(3).random((len(mesh.positions), 3))
     third = np.repeat(np.linalg.norm(mesh.face_normals, axis=1) / 6.0, 3)
@@ -171,11 +175,11 @@ def test_smoothing_keeps_the_integral_and_takes_means() -> None:
     grid = plane(cells=8)
     peak = np.zeros((len(grid.positions), 3))
     peak[40] = 1.0
-    once = 0.5**2 + 6 * (1 / 12) ** 2  # what its six neighbours got, they give a twelfth of back
+    once = 0.5**2 + 6 * (1 / 12) ** 2  # each of the six neighbours receives a twelfth, and returns a twelfth of that
     np.testing.assert_allclose(smoothed(grid, peak)[40], once, rtol=1e-6)
 
 
-def test_the_same_again_and_from_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_thickness_has_the_same_bits_each_time_and_from_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = sphere(radius=3.0, vertices=500)
     first = local_thickness(mesh, MARBLE)
     with monkeypatch.context() as patched:

@@ -1,4 +1,4 @@
-"""The render mesh and its atlas: when a file's texture coordinates serve, and what each library makes else."""
+"""The render mesh and its atlas: from the texture coordinates of a file, or computed by each library."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wgsss.scene import Mesh, load_mesh
 
 @pytest.fixture(params=LIBRARIES)
 def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Unwraps by one library after the other."""
+    """Unwrap by each of the libraries in turn."""
     if not find_spec(request.param):
         pytest.skip(f"{request.param} is not installed")
     monkeypatch.setenv(VARIABLE, request.param)
@@ -29,7 +29,7 @@ def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def joined(*meshes: Mesh) -> Mesh:
-    """Separate parts in one mesh."""
+    """Join meshes as separate parts of one mesh."""
     starts = np.cumsum([0, *(len(m.positions) for m in meshes)])
     positions = np.concatenate([m.positions + np.array([0, 0, 100 * i]) for i, m in enumerate(meshes)])
     faces = np.concatenate([m.faces + s for m, s in zip(meshes, starts[:-1], strict=True)])
@@ -37,7 +37,7 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def check(mesh: Mesh, render_mesh: RenderMesh) -> None:
-    """What holds for any render mesh."""
+    """Check what every render mesh must satisfy."""
     np.testing.assert_array_equal(render_mesh.vertex[render_mesh.faces], mesh.faces)
     np.testing.assert_array_equal(render_mesh.normals[render_mesh.faces], mesh.shading_normals)
     if mesh.corner_uvs is not None:
@@ -72,7 +72,7 @@ def test_hard_edges_split_normals_but_not_charts(gpu: Gpu) -> None:
     assert render_mesh.charts.max() == 0
 
 
-def test_split_only_splits(gpu: Gpu) -> None:
+def test_split_makes_no_atlas(gpu: Gpu) -> None:
     smooth = icosphere(10, 2)
     render_mesh = split(smooth)
     assert len(render_mesh.vertex) == len(smooth.positions)
@@ -81,7 +81,7 @@ def test_split_only_splits(gpu: Gpu) -> None:
     assert not split(box()).atlas.any()
 
 
-def test_overlaps_are_found(gpu: Gpu, library: str) -> None:
+def test_overlapping_coordinates_are_replaced(gpu: Gpu, library: str) -> None:
     left, right = sheet(np.eye(2) * 0.02, center=(0.25, 0.5)), sheet(np.eye(2) * 0.02, center=(0.75, 0.5))
     mirrored = sheet(np.diag([-0.02, 0.02]), center=(0.25, 0.5))
     apart, twice, mirror = joined(left, right), joined(left, left), joined(left, mirrored)
@@ -89,7 +89,7 @@ def test_overlaps_are_found(gpu: Gpu, library: str) -> None:
     assert not is_unique(gpu, twice, twice.corner_uvs)
     assert not is_unique(gpu, mirror, mirror.corner_uvs)
     assert is_unique(gpu, mirrored, mirrored.corner_uvs)
-    little = sheet(np.eye(2) * 0.002, center=(0.25, 0.5))  # 1 % of the other's texels
+    little = sheet(np.eye(2) * 0.002, center=(0.25, 0.5))  # has 1 % of the texels of the other
     overlapped = joined(left, little)
     assert not is_unique(gpu, overlapped, overlapped.corner_uvs)
     for mesh in (twice, mirror, overlapped):
@@ -98,7 +98,7 @@ def test_overlaps_are_found(gpu: Gpu, library: str) -> None:
         assert is_unique(gpu, mesh, render_mesh.atlas[render_mesh.faces])
 
 
-def test_coordinates_without_area_do_not_serve(gpu: Gpu) -> None:
+def test_coordinates_without_area_are_replaced(gpu: Gpu) -> None:
     mesh = sheet(np.eye(2) * 0.03)
     uvs = mesh.corner_uvs.copy()
     uvs[0] = uvs[0, 0]
@@ -106,7 +106,7 @@ def test_coordinates_without_area_do_not_serve(gpu: Gpu) -> None:
     assert not is_unique(gpu, mesh, np.full_like(uvs, 0.5))
 
 
-def test_coordinates_beyond_the_square_are_fitted(gpu: Gpu) -> None:
+def test_coordinates_outside_the_unit_square_are_fitted_into_it(gpu: Gpu) -> None:
     mesh = sheet(np.eye(2) * 0.2, center=(3, -1))
     render_mesh = unwrap(gpu, mesh)
     check(mesh, render_mesh)
@@ -115,7 +115,7 @@ def test_coordinates_beyond_the_square_are_fitted(gpu: Gpu) -> None:
 
 
 @pytest.mark.parametrize("radius", [20, 1e-3, 1e4])
-def test_sphere(gpu: Gpu, radius: float, library: str) -> None:
+def test_a_sphere_is_unwrapped(gpu: Gpu, radius: float, library: str) -> None:
     from scipy.ndimage import distance_transform_edt
 
     mesh = icosphere(radius, 3)
@@ -132,13 +132,15 @@ def test_sphere(gpu: Gpu, radius: float, library: str) -> None:
         assert distance[others].min() > 8
 
 
-def test_same_atlas_every_time(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str) -> None:
+def test_the_atlas_is_the_same_every_time(
+    gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
     first = unwrap(gpu, icosphere(7, 3))
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path))
     np.testing.assert_array_equal(first.atlas, unwrap(gpu, icosphere(7, 3)).atlas)
 
 
-def test_faces_without_area(gpu: Gpu, library: str) -> None:
+def test_faces_without_area_are_accepted(gpu: Gpu, library: str) -> None:
     mesh = icosphere(10, 2)
     with_sliver = Mesh(mesh.positions, np.concatenate([mesh.faces, [[0, 1, 1]]]))
     render_mesh = unwrap(gpu, with_sliver)
@@ -152,11 +154,11 @@ def test_faces_without_area(gpu: Gpu, library: str) -> None:
     ("file", "faces", "own"),
     [("lee_perry_smith/LeePerrySmith.obj", None, True), ("spot.obj", None, True), ("bunny_stanford.ply", 6000, False)],
 )
-def test_scans(gpu: Gpu, library: str, data: Path, file: str, faces: int | None, own: bool) -> None:
+def test_scans_are_unwrapped(gpu: Gpu, library: str, data: Path, file: str, faces: int | None, own: bool) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of repairs
         mesh = load_mesh(data / file, size_mm=300).mesh
-    if faces:  # an open piece; all of it takes xatlas half a minute
+    if faces:  # an open piece; the whole mesh takes xatlas half a minute
         used, index = np.unique(mesh.faces[:faces], return_inverse=True)
         mesh = Mesh(mesh.positions[used], index.reshape(-1, 3))
     render_mesh = unwrap(gpu, mesh)

@@ -1,11 +1,11 @@
-// Which face covers each texel of an atlas: face + 1, or 0. Where several do, the one drawn last stays, so that two
-// drawings in opposite orders differ exactly where faces overlap.
+// Draws the faces of a mesh into its atlas: face + 1 in each texel that a face covers, else 0. Of faces that overlap,
+// the one drawn last remains: two drawings in opposite orders differ exactly where faces overlap.
 
 import package::targets::{R32Uint};
 
 struct Params {
     face_count: u32,
-    reverse: u32, // 1: draw the last face first
+    reverse: u32, // 1: draw the faces in reverse order
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -1,17 +1,17 @@
-// Draws the charts of an atlas: which chart each texel is inside of, and the gradients of the atlas coordinates over the
+// Draws the charts of an atlas: the chart that covers each texel, and the gradients of the atlas coordinates over the
 // surface there.
 
 import package::charts::{INSIDE};
 import package::targets::{R32Uint, RGBA16Float};
 
 struct Params {
-    size: f32, // of the map, texels
+    size: f32, // width and height of the map, texels
 }
 
 struct Vertex {
     atlas: vec2f,
     root: vec3f,    // p, q, r of the symmetric root [p q; q r] of the inverse metric, uv per mm
-    along_u: vec3f, // with along_v the orthonormal directions on the surface that the columns of the root belong to
+    along_u: vec3f, // along_u and along_v: orthonormal directions on the surface, those of the columns of the root
     along_v: vec3f,
 }
 
@@ -43,8 +43,9 @@ fn vs(@builtin(vertex_index) i: u32) -> Varying {
 
 @fragment
 fn fs(in: Varying) -> Texel {
-    // Interpolated directions are no longer orthonormal: the nearest ones that are, by the inverse root of their Gram
-    // matrix (a b; b c), which is [c+s -b; -b a+s] / (s sqrt(a + c + 2 s)) with s the root of its determinant.
+    // Interpolated directions are not orthonormal. The nearest orthonormal ones follow from the inverse square root of
+    // their Gram matrix (a b; b c), which is [c+s -b; -b a+s] / (s sqrt(a + c + 2 s)), where s is the root of its
+    // determinant.
     let a = dot(in.along_u, in.along_u);
     let b = dot(in.along_u, in.along_v);
     let c = dot(in.along_v, in.along_v);

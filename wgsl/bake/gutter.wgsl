@@ -1,15 +1,18 @@
-// Draws around each border edge of a chart the texels that are nearer to it than to any other border: seam + 1.
-// The depth buffer keeps the nearest one, and what the charts themselves cover (at depth 0).
+// Draws the gutter: seam + 1 in the texels around each border edge of a chart that are nearer to it than to other
+// edges.
+//
+// The depth is the distance to the edge. The depth buffer also protects the texels inside charts, which have depth 0.
 
 import package::targets::{R32Uint};
 
-// Of two edges that meet at the nearest corner, the one that a texel overshoots less is to win.
+// If the nearest point is a corner, two edges are equally near: this small weight of the distance along an edge, beyond
+// its end, decides.
 const OVERSHOOT: f32 = 1e-3;
-const GUTTER: f32 = 3.0;    // texels: what the footprint of a filter at a border can touch
-const BEHIND: f32 = 0.05; // texels: how far inside the edge a centre that no face covers may be, by rounding
+const GUTTER: f32 = 3.0;  // texels: width of the gutter, which the footprint of a filter at a border can reach
+const BEHIND: f32 = 0.05; // texels: uncovered centres may lie inside the edge by this much, by rounding
 
 struct Params {
-    size: f32, // of the map, texels
+    size: f32, // width and height of the map, texels
 }
 
 struct Edge {

@@ -1,1 +1,1 @@
-"""What is computed once for a mesh and kept in the user's cache: its unwrap, the maps of its charts, …"""
+"""Data that are computed once for a mesh, a material or a light and stored in the user's cache."""

@@ -1,7 +1,7 @@
-"""Texture coordinates for a mesh that has none, or none that are unique.
+"""Atlases: unique texture coordinates for meshes that have none.
 
-xatlas makes them where it is installed, which is wherever it has a wheel, and uvunwrap elsewhere. The environment
-variable WGSSS_UNWRAP chooses one of the two.
+The library xatlas computes them if it is installed, else uvunwrap. The environment variable WGSSS_UNWRAP chooses one of
+the two.
 """
 
 from __future__ import annotations
@@ -20,18 +20,20 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 VARIABLE = "WGSSS_UNWRAP"
-"""the environment variable that names the library"""
+"""The environment variable that names the library."""
 PADDING = 5
-"""Empty texels around each chart where the atlas is about 1024 to 1300 texels wide, the size that both libraries aim
-at: at least 8 between two charts at 1024, and 4 at 512."""
-_SIDE = 1024  # of uvunwrap's page, in texels
-_FILLED = 0.2  # the least of it that charts are to cover, or else the page grows
+"""Empty texels around each chart of an atlas that is 1024 to 1300 texels wide, the width that both libraries aim at.
+
+Between two charts there are at least 8 empty texels on a map of 1024 texels, and 4 on one of 512.
+"""
+_SIDE = 1024  # width of the page of uvunwrap, texels
+_FILLED = 0.2  # share of the page that charts must cover; else a larger page is used
 
 
 def library() -> str:
-    """The name of the library that makes atlases.
+    """Return the name of the library that computes atlases.
 
-    Raises InputError where none is installed, or not the one that $WGSSS_UNWRAP names.
+    Raises InputError if none is installed, or if the one that $WGSSS_UNWRAP names is unknown or not installed.
     """
     chosen = os.environ.get(VARIABLE)
     if chosen and chosen not in LIBRARIES:
@@ -43,16 +45,15 @@ def library() -> str:
 
 
 def new_atlas(mesh: Mesh) -> Array:
-    """float32 (F, 3, 2): texture coordinates of the faces' corners that fill the unit square, v down. No two points of
-    the surface share one.
+    """Compute texture coordinates for the corners of the faces, float32 (F, 3, 2), v down, in the unit square.
 
-    Raises InputError where the mesh has no face with an area.
+    No two points of the surface have the same coordinates. Raises InputError if the mesh has no face with an area.
     """
     size = np.ptp(mesh.bounds, axis=0).max()
     twice_areas = np.linalg.norm(mesh.face_normals, axis=1)
     if not (size > 0 and twice_areas.max() > 1e-12 * size * size):
         raise InputError(f"{mesh.name}: no face has an area, so the mesh cannot be unwrapped")
-    # xatlas compares areas with absolute thresholds: faces much smaller than 1 would end up as hundreds of charts.
+    # xatlas compares areas with absolute thresholds: it would put faces much smaller than 1 into hundreds of charts.
     unit = np.sqrt(np.median(twice_areas[twice_areas > 0]))
     atlas = LIBRARIES[library()]((_smoothed(mesh) / unit).astype(np.float32), mesh.faces.astype(np.uint32))
     if atlas is None:
@@ -61,6 +62,7 @@ def new_atlas(mesh: Mesh) -> Array:
 
 
 def _xatlas(positions: Array, faces: Array) -> Array | None:
+    """Compute an atlas by xatlas. None if it finds no charts, or leaves out faces."""
     import xatlas
 
     pack = xatlas.PackOptions()
@@ -69,22 +71,23 @@ def _xatlas(positions: Array, faces: Array) -> Array | None:
     atlas = xatlas.Atlas()
     atlas.add_mesh(positions, faces)
     atlas.generate(xatlas.ChartOptions(), pack)
-    _, found, uvs = atlas.get_mesh(0)
-    if not atlas.chart_count or len(found) != len(faces):
+    _, atlas_faces, uvs = atlas.get_mesh(0)
+    if not atlas.chart_count or len(atlas_faces) != len(faces):
         return None
-    # The page is not square: stretched to fill the map, with room for the gutters along its rim.
+    # The page is not square. It is stretched to fill the map, and keeps a margin for the gutters at its border.
     page = np.array([atlas.width, atlas.height])
-    return np.asarray(((uvs * page + PADDING) / (page + 2 * PADDING)).astype(np.float32)[found])
+    return np.asarray(((uvs * page + PADDING) / (page + 2 * PADDING)).astype(np.float32)[atlas_faces])
 
 
 def _uvunwrap(positions: Array, faces: Array) -> Array | None:
+    """Compute an atlas by uvunwrap. None if it finds no charts."""
     import uvunwrap
 
-    # The other way of packing fits in an eighth more, but takes minutes for thousands of charts.
+    # The other packing covers an eighth more of the page, but takes minutes for thousands of charts.
     options: dict[str, Any] = {"padding": PADDING, "packing": "fast"}
     meshes = [uvunwrap.Mesh(positions, faces)]
     atlas = uvunwrap.generate(meshes, page_size=_SIDE, **options)
-    # Gutters would take up most of the page where there are very many charts.
+    # With very many charts, the padding would fill most of the page.
     if atlas.chart_count and (atlas.page_count > 1 or atlas.utilization < _FILLED):
         a, b, c = positions[faces].astype(np.float64).transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0
@@ -96,12 +99,15 @@ def _uvunwrap(positions: Array, faces: Array) -> Array | None:
 
 
 LIBRARIES: dict[str, Callable[[Array, Array], Array | None]] = {"xatlas": _xatlas, "uvunwrap": _uvunwrap}
-"""what can make an atlas (F, 3, 2) of positions (V, 3) and faces (F, 3), by name, the default first; None: it cannot"""
+"""Functions that compute an atlas (F, 3, 2) from positions (V, 3) and faces (F, 3), by library, the default first."""
 
 
 def _smoothed(mesh: Mesh) -> Array:
-    """float64 (V, 3): positions moved a little along their normals towards the mean of their neighbours, mm. On rough
-    scans that saves a third of the charts; what it distorts, the stretch of the true surface accounts for."""
+    """Return smoothed positions, float64 (V, 3), mm, relative to the lower corner of the bounding box.
+
+    They are moved a little along their normals, towards the mean of their neighbours. Rough scans then have a third
+    fewer charts. The charts of the smoothed mesh stretch the true surface a little more, which `stretch` measures.
+    """
     ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]).T
     degree = np.maximum(np.bincount(ends.reshape(-1), minlength=len(mesh.positions)), 1)
     smooth = mesh

@@ -1,4 +1,4 @@
-"""Environments, prefiltered: what each normal receives, and what each mirror direction reflects."""
+"""Prefiltered environments: the irradiance for each normal, and the mean radiance for each mirror direction."""
 
 from __future__ import annotations
 
@@ -16,39 +16,43 @@ from wgsss.gpu import Gpu
 from wgsss.graph import Graph, Handle
 from wgsss.scene import DirectionalLight, EnvironmentLight, Material
 
-IRRADIANCE_SIZE = (128, 64)  # the cosine leaves little that is finer
+IRRADIANCE_SIZE = (128, 64)  # texels: the cosine removes finer detail
 REFLECTION_SIZE = (128, 64)
 _SOURCE_SIZE = (128, 64)
 NO_SKY = np.zeros((1, 1, 3), np.float32)
-_ROOTS = (-14, 15)  # powers of two that a half float holds
+_ROOTS = (-14, 15)  # exponents of the powers of 2 within the range of half floats
 
 
 @dataclass(frozen=True)
 class Prefiltered:
-    """Textures over directions (`map_of_direction`, wgsl/sampling.wgsl): L_d by normal, W/m^2, and mean radiance by
-    mirror direction, W/(m^2 sr). RGB is in units of alpha squared: half floats hold no more than 65504."""
+    """Textures over directions (`map_of_direction` in wgsl/sampling.wgsl).
+
+    RGB is in units of alpha squared, since half floats end at 65504.
+    """
 
     irradiance: Any
+    """L_d by normal, W/m^2"""
     reflection: Any
+    """mean radiance by mirror direction, W/(m^2 sr)"""
 
 
 @dataclass(frozen=True)
-class Divided:
-    """The light of environments: what is lit by as by any light, and what is prefiltered."""
+class SplitEnvironment:
+    """The light of environments, divided into directional lights and a smooth rest, which is prefiltered."""
 
     suns: tuple[DirectionalLight, ...]
     rest: npt.NDArray[np.float32]
-    """as `summed` gives it, without the suns"""
+    """radiance (H, W, 3), W/(m^2 sr), as of `summed_radiance`, without the suns"""
 
 
 def rho_dt_table(graph: Graph, material: Material) -> Handle:
-    """rho_dt over the cosine for a material's surface (Maisch & Ropinski 2017, eq. 3)."""
+    """Declare the pass that tabulates rho_dt over the cosine for a material (Maisch & Ropinski 2017, eq. 3)."""
     params = {"alpha": material.roughness**2, "eta": material.eta}
     return graph.dispatch("frame/rho_dt", size=(64, 1), params=params, label=f"{material.roughness:g} {material.eta:g}")
 
 
 def prefilter(gpu: Gpu, pixels: npt.NDArray[np.float32], material: Material) -> Prefiltered:
-    """Radiance of the source size, prefiltered for a material's surface; black where there is none."""
+    """Prefilter radiance (H, W, 3), as of `summed_radiance`, for the surface of a material. Cached."""
     if not pixels.any():
         black = gpu.texture(np.zeros((1, 1, 4)), "rgba16float")
         return Prefiltered(black, black)
@@ -75,29 +79,33 @@ def prefilter(gpu: Gpu, pixels: npt.NDArray[np.float32], material: Material) -> 
         graph.run(irradiance, reflection)
         return {"irradiance": graph.read(irradiance), "reflection": graph.read(reflection)}
 
-    # Only what the surface does counts, so that no filter runs anew for another medium or colour below it.
+    # The key has only the parameters of the surface: a change of the medium or the colour needs no new maps.
     key = [pixels, material.roughness, material.eta, material.specular, gpu.name]
     maps = cached("environment", key, make, label="filtering the environment")
     return Prefiltered(*(gpu.texture(maps[name], "rgba16float") for name in ("irradiance", "reflection")))
 
 
-def divided(lights: Sequence[EnvironmentLight]) -> Divided:
-    """Environments, the suns of their images (`take_suns`) apart from the rest."""
+def split_environments(lights: Sequence[EnvironmentLight]) -> SplitEnvironment:
+    """Divide environments into the suns of their images (`take_suns`) and the rest of their light."""
     suns: list[DirectionalLight] = []
     rests = []
     for light in lights:
-        found, rest = take_suns(light.pixels())
-        suns += [_light(sun, light.rotation) for sun in found]
+        image_suns, rest = take_suns(light.pixels())
+        suns += [_light(sun, light.rotation) for sun in image_suns]
         rests.append(rest)
-    return Divided(tuple(suns), _total(lights, rests))
+    return SplitEnvironment(tuple(suns), _total(lights, rests))
 
 
-def summed(lights: Sequence[EnvironmentLight]) -> npt.NDArray[np.float32]:
-    """The radiance of all environments added up, at the resolution that the filters read; 32 x 16 where constant."""
+def summed_radiance(lights: Sequence[EnvironmentLight]) -> npt.NDArray[np.float32]:
+    """Return the summed_radiance radiance of all environments, float32 (H, W, 3), W/(m^2 sr), as prefilters read it.
+
+    It has the size 128 x 64, or 32 x 16 if all environments are constant.
+    """
     return _total(lights, [light.pixels() for light in lights])
 
 
 def _total(lights: Sequence[EnvironmentLight], images: Sequence[npt.NDArray[np.float32]]) -> npt.NDArray[np.float32]:
+    """Return the sum of the images (H, W, 3), each rotated as its light."""
     total = np.zeros((16, 32, 3), np.float32)
     for light, pixels in zip(lights, images, strict=True):
         if (pixels == pixels[0, 0]).all():
@@ -109,7 +117,7 @@ def _total(lights: Sequence[EnvironmentLight], images: Sequence[npt.NDArray[np.f
 
 
 def _light(sun: Sun, rotation: float) -> DirectionalLight:
-    """A sun of an image that is turned, see EnvironmentLight."""
+    """Return a sun of an image as a directional light. `rotation`, degrees, is that of its EnvironmentLight."""
     turn = math.radians(rotation)
     x, y, z = sun.towards
     away = (-(x * math.cos(turn) + z * math.sin(turn)), -y, -(z * math.cos(turn) - x * math.sin(turn)))
@@ -117,17 +125,18 @@ def _light(sun: Sun, rotation: float) -> DirectionalLight:
 
 
 def _reduced(pixels: npt.NDArray[Any], rotation: float) -> npt.NDArray[np.float32]:
-    """The mean radiance over each texel of the source size, turned by `rotation` degrees."""
+    """Reduce an image (H, W, 3) to the source size, rotated by `rotation` degrees. Texels are means over their area."""
     width, height = _SOURCE_SIZE
-    edges = np.cos(np.linspace(0.0, np.pi, len(pixels) + 1))  # solid angle goes by the cosine
-    wanted = np.cos(np.linspace(0.0, np.pi, height + 1))
+    # The solid angle between two latitudes is in proportion to the difference of their cosines.
+    edges = np.cos(np.linspace(0.0, np.pi, len(pixels) + 1))
+    new_edges = np.cos(np.linspace(0.0, np.pi, height + 1))
     rows = np.empty((height, *pixels.shape[1:]))
     for i in range(height):
-        overlap = np.minimum(edges[:-1], wanted[i]) - np.maximum(edges[1:], wanted[i + 1])
+        overlap = np.minimum(edges[:-1], new_edges[i]) - np.maximum(edges[1:], new_edges[i + 1])
         here = np.flatnonzero(overlap > 0.0)
         share = overlap[here] / overlap[here].sum()
         rows[i] = (share[:, None, None] * pixels[here]).sum(axis=0)
-    # Along a row, from its integral, which goes on periodically.
+    # Along a row, the mean over a texel is a difference of the row's integral, which is continued periodically.
     integral = np.concatenate([np.zeros((height, 1, 3)), np.cumsum(rows, axis=1)], axis=1)
     at = (np.arange(width + 1) / width + rotation / 360.0) * rows.shape[1]
     turns, within = np.divmod(at, rows.shape[1])

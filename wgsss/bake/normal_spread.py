@@ -1,4 +1,7 @@
-"""How far a surface turns within a distance: what can be seen may get light from what faces away by that angle."""
+"""The largest angle between the normal at a point and those within a distance.
+
+A visible point may receive light from points whose normals face away from the viewer by that angle more.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +14,17 @@ from wgsss.cache import Arrays, cached
 
 Array = npt.NDArray[Any]
 
-_CELLS = 4.0  # per distance: nearer points whose normals are alike are taken together
+_CELLS = 4.0  # per distance: points in one cell with similar normals are averaged
 _AT_ONCE = 10_000  # points, so that the pairs fit in memory
 
 
 def normal_spread(positions: Array, normals: Array, distance: float) -> Array:
-    """float32 (N,): the largest angle, rad, between the normal at each point and those at points within `distance`.
+    """Return the largest angle between the normal at each point and those within a distance: float32 (N,), rad. Cached.
 
     Args:
-        positions: (N, 3), mm
-        normals: (N, 3), of length 1
-        distance: mm, as the crow flies; it is exact to a quarter
+        positions: (N, 3), mm.
+        normals: (N, 3), of length 1.
+        distance: mm, along a straight line. The effective distance is within a quarter of it.
     """
 
     def make() -> Arrays:
@@ -32,6 +35,7 @@ def normal_spread(positions: Array, normals: Array, distance: float) -> Array:
 
 
 def _normal_spread(positions: Array, normals: Array, distance: float) -> Array:
+    """Compute the result of `normal_spread`."""
     from scipy.spatial import cKDTree
 
     cell = np.floor((positions - positions.min(axis=0)) / (distance / _CELLS)).astype(np.int64)
@@ -47,7 +51,7 @@ def _normal_spread(positions: Array, normals: Array, distance: float) -> Array:
     tree, least = cKDTree(place), np.ones(len(positions))
     for start in range(0, len(positions), _AT_ONCE):
         near = tree.query_ball_point(positions[start : start + _AT_ONCE], distance)
-        of = start + np.repeat(np.arange(len(near)), [len(found) for found in near])
-        to = np.concatenate([np.asarray(found, np.int64) for found in near])
+        of = start + np.repeat(np.arange(len(near)), [len(indices) for indices in near])
+        to = np.concatenate([np.asarray(indices, np.int64) for indices in near])
         np.minimum.at(least, of, np.einsum("nd,nd->n", normals[of], normal[to]))
     return np.arccos(np.clip(least, -1.0, 1.0)).astype(np.float32)

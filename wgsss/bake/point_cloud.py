@@ -1,4 +1,4 @@
-"""Points spread evenly over a mesh, each with the area nearest to it, and the octree over them."""
+"""Evenly spread samples of a mesh, each with the area that is nearest to it, and an octree over them."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 MOST = 200_000
-"""Points on one mesh: they take some 30 MB on the device, and half a minute to spread."""
-_PARTS = 2.0  # per spacing along a triangle's edge: some nine parts of triangles to a point
-_MOST_PARTS = 4_000_000  # slivers are cut into many
-_ROUNDS = 3  # of relaxation: areas then spread by a fifth about their mean, and more rounds hardly even them out
+"""The most samples of a mesh: they take 30 MB on the device, and half a minute to compute."""
+_PARTS = 2.0  # parts per spacing along the edge of a triangle: about nine parts for each sample
+_MOST_PARTS = 4_000_000  # long thin triangles are cut into many parts
+_ROUNDS = 3  # of relaxation: the areas then differ by a fifth from their mean, and more rounds hardly improve that
 
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """Samples of a mesh in the order of their octree."""
+    """The samples of a mesh, in the order of their octree."""
 
     samples: Samples
     tree: Octree
     spacing: float
-    """mm: the root of the mean area of a sample"""
+    """mm: the square root of the mean area of a sample"""
 
 
 def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
-    """Samples of `mesh`, one to each `spacing` x `spacing` mm^2, cached.
+    """Return samples of a mesh, one for each `spacing` x `spacing` mm^2. Cached.
 
-    There are at most MOST of them: where that is too few, a warning says what spacing they have instead. Raises
-    InputError for a mesh without an area.
+    If these were more than MOST, a warning states the larger spacing that is used. Raises InputError for a mesh without
+    an area.
     """
     if not mesh.area > 0.0:
         raise InputError(f"{mesh.name}: the mesh has no area to spread samples over")
-    wanted = mesh.area / spacing**2
-    if wanted > MOST:
+    count_at_spacing = mesh.area / spacing**2
+    if count_at_spacing > MOST:
         coarser = float(np.sqrt(mesh.area / MOST))
         warnings.warn(
-            f"{mesh.name}: {wanted:.3g} samples {spacing:.2g} mm apart are too many: "
+            f"{mesh.name}: {count_at_spacing:.3g} samples {spacing:.2g} mm apart are too many: "
             f"{MOST} are used, {coarser:.2g} mm apart",
             Note,
             stacklevel=2,
@@ -65,6 +65,7 @@ def point_cloud(mesh: Mesh, spacing: float) -> PointCloud:
 
 
 def _make(mesh: Mesh, spacing: float) -> tuple[Samples, Octree]:
+    """Compute the samples of a mesh and their octree."""
     parts = _parts(mesh, spacing)
     area = np.linalg.norm(mesh.face_normals, axis=1)[parts.face] / 2 * parts.share
     keep = area > 0
@@ -81,20 +82,22 @@ def _make(mesh: Mesh, spacing: float) -> tuple[Samples, Octree]:
 
 
 def _above(corners: Array, x: Array, otherwise: Array) -> Array:
-    """Barycentric coordinates (N, 3) of what x (N, 3) is above on triangles (N, 3, 3), or of a place near it inside;
-    `otherwise` on triangles too thin to tell."""
+    """Return the barycentric coordinates (N, 3) of the points x (N, 3), projected onto triangles (N, 3, 3).
+
+    Points outside their triangle are moved to its border. `otherwise` (N, 3) is used for degenerate triangles.
+    """
     first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
     a, b, c = (np.einsum("nd,nd->n", *pair) for pair in ((first, first), (first, second), (second, second)))
     u, v = (np.einsum("nd,nd->n", edge, x - corners[:, 0]) for edge in (first, second))
     size = a * c - b * b
-    sound = size > 1e-9 * a * c
-    inside = np.stack([c * u - b * v, a * v - b * u], axis=1) / np.where(sound, size, 1.0)[:, None]
-    found = np.maximum(np.column_stack([1.0 - inside.sum(axis=1), inside]), 0.0)
-    return np.where(sound[:, None], found / found.sum(axis=1, keepdims=True), otherwise)
+    has_area = size > 1e-9 * a * c
+    inside = np.stack([c * u - b * v, a * v - b * u], axis=1) / np.where(has_area, size, 1.0)[:, None]
+    barycentric = np.maximum(np.column_stack([1.0 - inside.sum(axis=1), inside]), 0.0)
+    return np.where(has_area[:, None], barycentric / barycentric.sum(axis=1, keepdims=True), otherwise)
 
 
 def _parts(mesh: Mesh, spacing: float) -> Samples:
-    """Small parts of the mesh's triangles, which are then dealt out to the samples."""
+    """Return small parts of the triangles of a mesh, from which the cells of the samples are formed."""
     width = spacing / _PARTS
     while count(mesh, width) > max(_MOST_PARTS, 2 * len(mesh.faces)):
         width *= 1.2
@@ -102,36 +105,37 @@ def _parts(mesh: Mesh, spacing: float) -> Samples:
 
 
 def _normals(mesh: Mesh) -> Array:
+    """Return the unit normals of the faces (F, 3); 0 for faces without area."""
     normal = mesh.face_normals
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
 def _spread(x: Array, normal: Array, area: Array, spacing: float) -> tuple[Array, Array, Array]:
-    """Cells of parts at `x` (P, 3): which part is in the middle of each, the cells' areas and their centroids.
+    """Divide parts at `x` (P, 3) into cells. Returns the middle part, the area and the centroid (3,) of each cell.
 
-    Lloyd's relaxation: from a start with equal areas between sites along a space-filling curve, each site moves to the
-    part nearest to the centroid of the parts that are nearest to it. The evenness is that of Turk's repulsion, and a
-    sum over centroids is right to second order. What faces another way is far: the two sides of a thin sheet have
-    cells of their own.
+    This is Lloyd's relaxation. It starts with sites along a space-filling curve that have equal areas between them.
+    Each site then moves to the part that is nearest to the centroid of its cell: the parts that are nearest to the
+    site. The cells are as even as those by Turk's repulsion, and sums over their centroids are accurate to second
+    order. Distances include the difference of the normals, so the two sides of a thin sheet have separate cells.
     """
     from scipy.spatial import KDTree
 
-    where = np.concatenate([x, 2.0 * spacing * normal], axis=1)
+    points = np.concatenate([x, 2.0 * spacing * normal], axis=1)
     sites = min(max(round(float(area.sum()) / spacing**2), 1), len(x))
     along = np.argsort(morton(x), kind="stable")
     reached = np.cumsum(area[along])
     site = along[np.unique(np.searchsorted(reached, (np.arange(sites) + 0.5) / sites * reached[-1]))]
     for last in [False] * _ROUNDS + [True]:
-        cell = KDTree(where[site]).query(where, workers=-1)[1]
+        cell = KDTree(points[site]).query(points, workers=-1)[1]
         size = np.bincount(cell, area, len(site))
-        moments = [np.bincount(cell, area * column, len(site)) for column in where.T]
+        moments = [np.bincount(cell, area * column, len(site)) for column in points.T]
         middle = np.stack(moments, axis=1) / np.maximum(size, 1e-300)[:, None]
         if last:
             break
-        off = np.square(where - middle[cell]).sum(axis=1)
+        off = np.square(points - middle[cell]).sum(axis=1)
         least = np.full(len(site), np.inf)
         np.minimum.at(least, cell, off)
         nearest = np.flatnonzero(off == least[cell])
         site[cell[nearest]] = nearest
-    kept = size > 0.0  # of two at one place, one has all
-    return site[kept], size[kept], middle[kept, :3]
+    used = size > 0.0  # of two sites at the same point, one gets all parts
+    return site[used], size[used], middle[used, :3]

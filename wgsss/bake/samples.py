@@ -1,4 +1,4 @@
-"""Samples of a surface, each standing for an area, so that integrals over the surface are sums."""
+"""Samples of a surface. Each stands for an area: integrals over the surface become sums over samples."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points that stay where they are on a surface when it deforms."""
+    """Points that keep their place on a surface when it deforms."""
 
     face: Array
-    """int32 (N,), the face that each lies on"""
+    """int32 (N,): the face of each sample"""
     barycentric: Array
-    """float64 (N, 3), where on it"""
+    """float64 (N, 3): the barycentric coordinates of the sample in its face"""
     share: Array
-    """float64 (N,), of the face's area: those of a face sum to 1 where each face has its own samples"""
+    """float64 (N,): the area of the sample over that of its face; those of a face sum to 1 if each face has samples"""
 
 
 def subdivided(mesh: Mesh, spacing: float) -> Samples:
-    """The middles of equal parts of each triangle, about `spacing` mm wide at most.
+    """Return the centroids of equal parts of each triangle, which are at most about `spacing` mm wide.
 
-    A triangle is cut n times along each edge into n^2 parts like itself, n as its longest edge wants: the midpoint
-    rule, whose areas sum to the mesh's, and whose error falls with the square of the spacing.
+    Each edge of a triangle is cut into n parts and the triangle into n^2 similar ones; n follows from the longest edge.
+    This is the midpoint rule: the areas sum to that of the mesh, and the error falls with the square of the spacing.
     """
     cuts = _cuts(mesh, spacing)
     faces, middles, share = [], [], []
@@ -57,24 +57,24 @@ def vertex_samples(mesh: Mesh, vertices: Array | slice = slice(None)) -> Samples
 
 
 def count(mesh: Mesh, spacing: float) -> int:
-    """How many samples `subdivided` gives."""
+    """Return the number of samples that `subdivided` returns."""
     return int(np.square(_cuts(mesh, spacing)).sum())
 
 
 def longest_edges(mesh: Mesh) -> Array:
-    """The length (F,) of each face's longest edge, mm, float64."""
+    """Return the length of the longest edge of each face: float64 (F,), mm."""
     corners = mesh.positions[mesh.faces].astype(np.float64)
     edges: Array = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     return edges
 
 
 def _cuts(mesh: Mesh, spacing: float) -> Array:
-    """Into how many parts (F,) each edge of a face is cut."""
+    """Return the number of parts (F,) into which each edge of a face is cut."""
     return np.maximum(np.ceil(longest_edges(mesh) / spacing), 1).astype(np.int64)
 
 
 def _parts(n: int) -> Array:
-    """Barycentric coordinates (n^2, 3) of the middles of the parts of a triangle that is cut n times."""
+    """Return the barycentric coordinates (n^2, 3) of the centroids of the parts of a triangle, n along each edge."""
     i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     upright = np.stack([i, j], axis=1)[i + j < n] + 1.0 / 3.0
     turned = np.stack([i, j], axis=1)[i + j < n - 1] + 2.0 / 3.0

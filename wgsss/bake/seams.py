@@ -1,4 +1,4 @@
-"""The borders of the charts, and where the surface goes on beyond them."""
+"""The borders of the charts, and the maps that continue the surface beyond them."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Seams:
-    """The border edges of the charts, each with the map that unfolds the surface across it."""
+    """The N border edges of the charts, each with the map that unfolds the surface across it."""
 
     ends: Array
-    """float64 (N, 2, 2): the ends of the edge, uv"""
+    """float64 (N, 2, 2): the two ends of each edge, uv"""
     outward: Array
-    """float64 (N,): +1 where the outside of the chart is to the left of the edge (in uv, v down), else -1"""
+    """float64 (N,): +1 if the outside of the chart is to the left of the edge (in uv, v down), else -1"""
     maps: Array
     """float64 (N, 2, 3): the affine map from uv beyond the edge to the uv of the neighbouring triangle"""
     charts: Array
-    """int32 (N,): the chart that each is a border of"""
+    """int32 (N,): the chart of each edge"""
 
 
 def find_seams(render_mesh: RenderMesh, roots: Array) -> Seams:
-    """The seams of a surface. `roots` (R, 2, 2) are those of its stretch.
+    """Return the seams of a render mesh. `roots` (R, 2, 2) are `Stretch.root`.
 
-    The map takes the edge to the same edge of the neighbouring triangle, and a step perpendicular to it on the surface
-    to the step of the same length in mm that continues it. At open edges of the mesh it is the reflection about the
-    edge, as measured on the surface: what is constant stays constant, and nothing flows out.
+    The map of a seam takes the edge to the same edge of the neighbouring triangle. It takes a step on the surface
+    perpendicular to the edge to the step that continues it there, of the same length in mm. At an open edge of the mesh
+    the map is a reflection about the edge, measured on the surface: a blur then keeps constants, and no light is lost.
     """
     atlas = render_mesh.atlas.astype(np.float64)
     start = render_mesh.faces.reshape(-1)  # half-edge 3 f + k goes from corner k of face f to the next one
@@ -66,28 +66,31 @@ def find_seams(render_mesh: RenderMesh, roots: Array) -> Seams:
     )
 
 
-def apply(maps: Array, uv: Array) -> Array:
-    """(N, 2): affine maps (N, 2, 3) applied to one texture coordinate (N, 2) each."""
+def apply_maps(maps: Array, uv: Array) -> Array:
+    """Apply affine maps (N, 2, 3) to one texture coordinate each: (N, 2)."""
     return np.einsum("nij,nj->ni", maps[..., :2], uv) + maps[..., 2]
 
 
 def _others(start: Array, end: Array, usable: Array) -> Array:
-    """For each half-edge the first other one between the same two vertices, or -1."""
+    """Return, for each half-edge, the first other one between the same two vertices, or -1."""
     low, high = np.minimum(start, end), np.maximum(start, end)
     edges = np.where(usable, low.astype(np.int64) * (int(high.max()) + 1) + high, -1)
     order = np.argsort(edges, kind="stable")
     ordered = edges[order]
-    first = np.searchsorted(ordered, ordered)  # where the group of equal edges begins
+    first = np.searchsorted(ordered, ordered)  # the first of the equal edges
     second = np.minimum(first + 1, len(order) - 1)
     pick = np.where(first == np.arange(len(order)), second, first)
-    found = (ordered[pick] == ordered) & (pick != np.arange(len(order))) & (ordered >= 0)
+    paired = (ordered[pick] == ordered) & (pick != np.arange(len(order))) & (ordered >= 0)
     others = np.full(len(order), -1)
-    others[order[found]] = order[pick[found]]
+    others[order[paired]] = order[pick[paired]]
     return others
 
 
 def _perpendicular(edge: Array, inward: Array, root: Array) -> tuple[Array, Array]:
-    """The uv step of 1 mm on the surface perpendicular to `edge`, towards `inward`; and on which side that is."""
+    """Return the uv step (N, 2) of 1 mm on the surface perpendicular to `edge`, towards `inward`, and its side (N,).
+
+    The side is the sign of the cross product of `edge` and `inward`, in uv.
+    """
     x = np.linalg.solve(root, edge[..., None])[..., 0]  # the edge in mm, in an orthonormal frame
     side = np.sign(edge[:, 0] * inward[:, 1] - edge[:, 1] * inward[:, 0])
     normal = side[:, None] * np.stack([-x[:, 1], x[:, 0]], axis=-1) / np.linalg.norm(x, axis=1, keepdims=True)

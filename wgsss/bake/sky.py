@@ -1,4 +1,4 @@
-"""How much of the environment's light reaches each point of a scene past the scene itself."""
+"""The share of the environments' light that reaches each point of a scene, past the objects of the scene."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.bake import rays
-from wgsss.bake.environment import divided
+from wgsss.bake.environment import split_environments
 from wgsss.bake.suns import solid_angles
 from wgsss.cache import cached
 from wgsss.scene import EnvironmentLight, Scene
@@ -18,21 +18,22 @@ from wgsss.scene.geometry import cosine_directions, golden_azimuths
 Array = npt.NDArray[Any]
 
 DIRECTIONS = 256
-"""rays from each point; as many more towards the bright parts of an image"""
-_LIFT = 1e-4  # of the scene's extent: how far above the surface rays start
-_EVEN = 1e-3  # of the mean radiance, added to an image: what is seen of a sky that is black from here is its share, too
-_BLOCK = 4096  # points whose rays are cast at a time
+"""The number of rays from each point. With an image, as many more go towards its bright parts."""
+_LIFT = 1e-4  # of the extent of the scene: the height above the surface at which rays start
+_EVEN = 1e-3  # of the mean radiance is added to an image: a visible share is defined even where its sky is black
+_BLOCK = 4096  # points whose rays are cast together
 
 
 def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: Array, normals: Array) -> Array:
-    """The share (N,) of the environments' irradiance that arrives at points in the world, 0 to 1, float32, cached.
+    """Return the share of the environments' irradiance that arrives at points: float32 (N,), 0 to 1. Cached.
 
-    `positions` (N, 3) in mm and `normals` (N, 3) of length 1. By rays through the scene at rest, weighted by the
-    environments' mean over the channels: what of rho_dt depends on direction is left out, and so are suns, which are
-    lights (`wgsss.bake.suns`). Rays are spread by the cosine, and of images as many again by their radiance; the two
-    are combined by the balance heuristic (Veach & Guibas 1995, "Optimally combining sampling techniques").
+    `positions` (N, 3), mm, and `normals` (N, 3), of length 1, are in world space. Rays are cast through the scene at
+    rest and weighted by the mean radiance of the environments over the channels. This leaves out that rho_dt depends on
+    direction. Suns are left out, too, since they are lights (`wgsss.bake.suns`). The rays have a cosine density; for
+    images, as many again have the density of the radiance. The balance heuristic combines both (Veach & Guibas 1995,
+    "Optimally combining sampling techniques").
     """
-    pixels = divided(lights).rest
+    pixels = split_environments(lights).rest
     if not pixels.any():
         return np.ones(len(positions), np.float32)
     vertices, faces = _triangles(scene)
@@ -53,7 +54,7 @@ def sky_visibility(scene: Scene, lights: Sequence[EnvironmentLight], positions: 
 
 
 def _triangles(scene: Scene) -> tuple[Array, Array]:
-    """Everything in the scene as one mesh, in the world."""
+    """Return the positions (V, 3), mm, and faces (F, 3) of all objects together, in world space."""
     vertices, faces, first = [], [], 0
     for thing in scene.objects:
         vertices.append(thing.mesh.positions @ thing.matrix[:3, :3].T + thing.matrix[:3, 3])
@@ -63,7 +64,11 @@ def _triangles(scene: Scene) -> tuple[Array, Array]:
 
 
 def _visible(caster: rays.Caster, sky: _Image | np.float32, x: Array, n: Array, lift: float, first: int) -> Array:
-    """The share (N,) at points of which the first has the number `first`, which turns its directions."""
+    """Compute the shares (N,) at points x (N, 3) with normals n (N, 3).
+
+    The rays of each point are turned about its normal by an angle that depends on its number; the first has `first`.
+    The errors of neighbours then differ, instead of forming bands.
+    """
     n = n.astype(np.float64)
     turn = golden_azimuths(np.arange(first, first + len(x)))
     w = cosine_directions(n, golden_azimuths(np.arange(DIRECTIONS)) + turn[:, None])
@@ -83,11 +88,12 @@ def _visible(caster: rays.Caster, sky: _Image | np.float32, x: Array, n: Array, 
 
 
 class _Image:
-    """A latitude-longitude image of the sky (H, W, 3), by its mean over the channels.
+    """The mean over the channels of a latitude-longitude image of the sky (H, W, 3).
 
     Attributes:
-        total: its integral over all directions.
-        directions: (DIRECTIONS, 3), as dense as the radiance, the same for all points: shadows of neighbours are alike.
+        total: the integral of the radiance over all directions.
+        directions: (DIRECTIONS, 3), with a density in proportion to the radiance. They are the same for all points, so
+            that shadows are smooth.
     """
 
     def __init__(self, pixels: Array) -> None:
@@ -103,7 +109,7 @@ class _Image:
         row = np.searchsorted(rows, down)
         across = _radical_inverse(i) * columns[row, -1]
         column = np.array([np.searchsorted(columns[r], a, side="right") for r, a in zip(row, across, strict=True)])
-        # Within a texel evenly, too, in the cosine of latitude and in longitude.
+        # Spread evenly within a texel, too, over the cosine of the latitude and over the longitude.
         part = (rows[row] - down) / power[row].sum(axis=1)
         low, high = np.cos(np.pi * (row + 1) / height), np.cos(np.pi * row / height)
         y = low + part * (high - low)
@@ -112,7 +118,7 @@ class _Image:
         self.directions = np.stack([ring * np.sin(phi), y, -ring * np.cos(phi)], axis=1)  # see EnvironmentLight
 
     def radiance(self, w: Array) -> Array:
-        """In directions w (..., 3), shape (...)."""
+        """Return the radiance (...) in directions w (..., 3)."""
         height, width = self._grey.shape
         column = (0.5 + np.arctan2(w[..., 0], -w[..., 2]) / (2.0 * np.pi)) * width
         row = np.arccos(np.clip(w[..., 1], -1.0, 1.0)) / np.pi * height
@@ -120,6 +126,6 @@ class _Image:
 
 
 def _radical_inverse(i: Array) -> Array:
-    """In base 2: the second coordinate of the Hammersley set."""
+    """Return the radical inverse of i (N,) in base 2, the second coordinate of the Hammersley set."""
     bits = (i[:, None] >> np.arange(32)) & 1
     return bits @ 0.5 ** np.arange(1, 33)

@@ -1,4 +1,4 @@
-"""How the atlas stretches the surface: the metric of the parametrisation (Mikkelsen 2009, eq. 43, 44)."""
+"""The stretch between surface and atlas: the metric of the parametrisation (Mikkelsen 2009, eq. 43 and 44)."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """The atlas around each render vertex: a step d (mm) on the surface is the step root @ axes @ d in the atlas (uv).
+    """The stretch at each render vertex: a step of d mm on the surface is a step of root @ axes @ d in the atlas, uv.
 
-    `root` is the symmetric square root of the inverse metric (J^T J)^-1, with J = [sigma_s sigma_t] the derivatives of
-    position by texture coordinate (eq. 43, 44); a texture area dA covers dA / det(root) mm^2. `axes` are the directions
-    on the surface that its columns belong to: the orthonormal pair nearest to the gradients of u and v.
+    `root` is the symmetric square root of the inverse metric (J^T J)^-1, where J = [sigma_s sigma_t] are the
+    derivatives of the position by the texture coordinates (eq. 43, 44). An area dA in the atlas covers dA / det(root)
+    mm^2. `axes` are the directions on the surface of the columns of `root`: the orthonormal pair nearest to the
+    gradients of u and v.
     """
 
     root: Array
     """float64 (R, 2, 2), uv per mm"""
     axes: Array
-    """float64 (R, 2, 3): means over the faces around, so that they are to be made orthonormal again where these bend"""
+    """float64 (R, 2, 3): means over the adjacent faces, which are not quite orthonormal on a bent surface"""
 
 
 def stretch(mesh: Mesh, render_mesh: RenderMesh) -> Stretch:
-    """The stretch at the render vertices: means over the faces around, weighted by area.
+    """Return the stretch at the render vertices: means over the adjacent faces, weighted by area.
 
-    Roots are averaged rather than inverse metrics, since area times root stays bounded where a face degenerates; and
-    apart from the axes, since the mean of gradients over a bent surface is too short.
+    Roots are averaged instead of inverse metrics, since area times root stays bounded for degenerate faces. Roots and
+    axes are averaged separately, since the mean of the gradients on a bent surface would be too short.
     """
     gradients, areas = face_gradients(mesh, render_mesh)
     roots = _root(gradients @ gradients.transpose(0, 2, 1))
-    sound = np.linalg.det(roots) > 0
-    areas = np.where(sound, areas, 0)
-    axes = np.linalg.solve(np.where(sound[:, None, None], roots, np.eye(2)), gradients)
+    regular = np.linalg.det(roots) > 0
+    areas = np.where(regular, areas, 0)
+    axes = np.linalg.solve(np.where(regular[:, None, None], roots, np.eye(2)), gradients)
     point = atlas_vertices(render_mesh.vertex, render_mesh.atlas)
     corner = point[render_mesh.faces].reshape(-1)
     count = int(point.max()) + 1
@@ -51,19 +52,21 @@ def stretch(mesh: Mesh, render_mesh: RenderMesh) -> Stretch:
         return (total / np.where(weight > 0, weight, 1)[:, None]).reshape(count, *values.shape[1:])
 
     root = mean(roots)
-    # Where all faces around are degenerate, nothing is drawn: any finite value does.
+    # If all adjacent faces are degenerate, nothing is drawn: any finite value will do.
     root[weight == 0] = np.average(roots, axis=0, weights=areas) if areas.any() else np.eye(2)
     return Stretch(root[point], mean(axes)[point])
 
 
 def face_gradients(mesh: Mesh, render_mesh: RenderMesh) -> tuple[Array, Array]:
-    """float64 (F, 2, 3): the gradients of u and v over each face, uv per mm, zero for faces without an area; and their
-    areas (F,), mm^2. They are the rows of the pseudo-inverse of [sigma_s sigma_t]."""
+    """Return the gradients of u and v over each face, float64 (F, 2, 3), uv per mm, and its area (F,), mm^2.
+
+    The gradients are the rows of the pseudo-inverse of [sigma_s sigma_t]. They are 0 for faces without an area.
+    """
     corners = mesh.positions.astype(np.float64)[mesh.faces]
     texture = render_mesh.atlas.astype(np.float64)[render_mesh.faces]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(first, second)
-    area = np.linalg.norm(normal, axis=1)  # twice the triangle's
+    area = np.linalg.norm(normal, axis=1)  # twice that of the triangle
     longest = np.maximum(np.einsum("ij,ij->i", first, first), np.einsum("ij,ij->i", second, second))
     has_area = area > 1e-10 * longest
     # The gradients of the barycentric coordinates of corners 1 and 2.
@@ -74,7 +77,10 @@ def face_gradients(mesh: Mesh, render_mesh: RenderMesh) -> tuple[Array, Array]:
 
 
 def _root(matrices: Array) -> Array:
-    """(..., 2, 2): symmetric roots of positive semi-definite matrices, (A + sqrt(det) I) / sqrt(tr + 2 sqrt(det))."""
+    """Return the symmetric square roots (..., 2, 2) of positive semi-definite matrices A (..., 2, 2).
+
+    They are (A + sqrt(det A) I) / sqrt(tr A + 2 sqrt(det A)).
+    """
     root_det = np.sqrt(np.maximum(np.linalg.det(matrices), 0))
     scale = np.sqrt(np.trace(matrices, axis1=-2, axis2=-1) + 2 * root_det)[..., None, None]
     return (matrices + root_det[..., None, None] * np.eye(2)) / np.where(scale > 0, scale, 1)

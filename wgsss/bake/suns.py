@@ -1,7 +1,7 @@
 """Small bright regions of environment images, such as the sun, as directional lights.
 
-A sun is too small to be prefiltered, and for the few rays by which a vertex finds out how much of the sky it sees; and
-it casts a sharp shadow. What is left of the image has none of it. The light that an image gives stays the same.
+A sun casts a sharp shadow. It is too small for prefiltered maps, and for the few rays by which the visible share of the
+sky is computed. It is removed from the image, so the total light stays the same.
 """
 
 from __future__ import annotations
@@ -16,28 +16,31 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 
 MOST_SUNS = 8
-"""of an image: each has its shadow map"""
-_RADIUS = math.radians(2.0)  # of the cone that holds a sun with its glare; at least _TEXELS of the image
+"""The most suns of an image: each needs a shadow map."""
+_RADIUS = math.radians(2.0)  # of the cone that contains a sun and its glare; at least _TEXELS of the image
 _TEXELS = 1.5
-_COARSEST = math.radians(9.0)  # images of which the cone would be wider have no suns
-_LEAST_SHARE = 0.02  # of the light of the whole image: less light casts no shadow that is seen
+_COARSEST = math.radians(9.0)  # the largest radius: images that need a larger one are too coarse to have suns
+_LEAST_SHARE = 0.02  # of the light of the whole image: a weaker sun casts no visible shadow
 _LEAST_CONTRAST = 8.0  # of the mean radiance in the cone over that around it, up to twice its radius
-_MOST_TRIED = 64  # peaks of an image
+_MOST_TRIED = 64  # the most peaks of an image that are tested
 
 
 @dataclass(frozen=True)
 class Sun:
+    """A sun of an image, before the rotation of its light."""
+
     towards: Array
-    """the unit direction towards it (3,)"""
+    """unit vector (3,) towards the sun"""
     irradiance: Array
-    """RGB, W/m^2, on a surface that faces it (3,)"""
+    """RGB (3,), W/m^2, on a surface that faces the sun"""
 
 
 def take_suns(pixels: Array) -> tuple[list[Sun], Array]:
-    """The suns of a latitude-longitude image (H, W, 3) of radiance, the strongest first, and the image without them.
+    """Return the suns of an image, the strongest first, and the image without them.
 
-    A sun is what a cone has in excess of the mean radiance around it. Its irradiance is the excess times its solid
-    angle, summed up; its direction is the mean of the excess.
+    `pixels` (H, W, 3): radiance by latitude and longitude, W/(m^2 sr). A sun is the excess of the radiance in a cone
+    over the mean radiance around the cone. Its irradiance is the sum of the excess times the solid angle; its direction
+    is the mean direction of the excess.
     """
     height, width = pixels.shape[:2]
     radius = max(_RADIUS, _TEXELS * math.pi / height)
@@ -46,37 +49,40 @@ def take_suns(pixels: Array) -> tuple[list[Sun], Array]:
     if radius > _COARSEST or least == 0.0:
         return [], pixels
     cone = 2.0 * math.pi * (1.0 - math.cos(radius))
-    found: list[tuple[Sun, _Region]] = []
+    suns: list[tuple[Sun, _Region]] = []
     for _ in range(_MOST_TRIED):
         row, column = divmod(int(grey.argmax()), width)
         if grey[row, column] * cone < least:
             break
-        region = _Region(pixels, directions(row, column, height, width), radius)
+        region = _Region(pixels, texel_directions(row, column, height, width), radius)
         sun = region.sun
-        if sun is not None:  # about its middle rather than its brightest texel
+        if sun is not None:  # again, around its centre instead of its brightest texel
             region = _Region(pixels, sun.towards, radius)
             sun = region.sun
         grey[region.rows, region.columns] = -1.0  # tried
         grey[row, column] = -1.0
         if sun is not None and sun.irradiance.mean() >= least:
-            apart = all(float((sun.towards * other.towards).sum()) < math.cos(2.0 * radius) for other, _ in found)
-            found += [(sun, region)] if apart else []
-    found.sort(key=lambda pair: -float(pair[0].irradiance.mean()))
-    if not found:
+            apart = all(float((sun.towards * other.towards).sum()) < math.cos(2.0 * radius) for other, _ in suns)
+            suns += [(sun, region)] if apart else []
+    suns.sort(key=lambda pair: -float(pair[0].irradiance.mean()))
+    if not suns:
         return [], pixels
     rest = pixels.copy()
-    for _, region in found[:MOST_SUNS]:
+    for _, region in suns[:MOST_SUNS]:
         rest[region.rows[region.inside], region.columns[region.inside]] -= region.excess.astype(np.float32)
-    return [sun for sun, _ in found[:MOST_SUNS]], rest
+    return [sun for sun, _ in suns[:MOST_SUNS]], rest
 
 
 def solid_angles(height: int, width: int) -> Array:
-    """Steradians (height,) of a texel in each row of a latitude-longitude image."""
+    """Return the solid angle of a texel in each row of a latitude-longitude image: (height,), sr."""
     return -np.diff(np.cos(np.linspace(0.0, np.pi, height + 1))) * (2.0 * np.pi / width)
 
 
-def directions(row: Any, column: Any, height: int, width: int) -> Array:
-    """The directions (..., 3) of places in a latitude-longitude image, in texels: that of the first texel is 0, 0."""
+def texel_directions(row: Any, column: Any, height: int, width: int) -> Array:
+    """Return the directions (..., 3) of points in a latitude-longitude image.
+
+    `row` and `column` (...) are in texels; the centre of the first texel is at 0, 0.
+    """
     polar = (np.asarray(row) + 0.5) * (np.pi / height)
     around = (np.asarray(column) + 0.5) * (2.0 * np.pi / width) - np.pi  # see EnvironmentLight
     sine = np.sin(polar)
@@ -84,13 +90,13 @@ def directions(row: Any, column: Any, height: int, width: int) -> Array:
 
 
 class _Region:
-    """The texels of an image within twice a radius of a direction.
+    """The N texels of an image within twice a radius around a direction.
 
     Attributes:
         rows, columns: (N,) of the texels.
-        inside: (N,) whether they are within the radius.
-        excess: the radiance of those inside (M, 3) above the mean of the others.
-        sun: that excess, if its contrast to the others is that of a sun.
+        inside: (N,), whether each texel is within the radius.
+        excess: (M, 3), the radiance of the texels inside, less the mean radiance of the others.
+        sun: the excess as a sun; None if its contrast to the others is too low.
     """
 
     def __init__(self, pixels: Array, centre: Array, radius: float) -> None:
@@ -99,19 +105,19 @@ class _Region:
         low, high = polar - 2.0 * radius, polar + 2.0 * radius
         rows = np.arange(max(math.floor(low / math.pi * height), 0), min(math.ceil(high / math.pi * height), height))
         columns = np.arange(width)
-        if low > radius and high < math.pi - radius:  # columns that meet at the pole are all near
+        if low > radius and high < math.pi - radius:  # near a pole, all columns are near
             reach = math.ceil(math.asin(math.sin(2.0 * radius) / math.sin(polar)) / (2.0 * math.pi) * width) + 1
             middle = math.floor((0.5 + math.atan2(centre[0], -centre[2]) / (2.0 * math.pi)) * width)
             columns = np.arange(middle - reach, middle + reach + 1)[:width] % width
         row, column = (a.ravel() for a in np.meshgrid(rows, columns, indexing="ij"))
-        d = directions(row, column, height, width)
+        d = texel_directions(row, column, height, width)
         cosine = (d * centre).sum(axis=1)
-        kept = cosine > math.cos(2.0 * radius)
-        self.rows, self.columns, d = row[kept], column[kept], d[kept]
-        self.inside = cosine[kept] > math.cos(radius)
+        near = cosine > math.cos(2.0 * radius)
+        self.rows, self.columns, d = row[near], column[near], d[near]
+        self.inside = cosine[near] > math.cos(radius)
         weight = solid_angles(height, width)[self.rows]
         radiance = pixels[self.rows, self.columns].astype(np.float64)
-        inner, outer = (np.where(here, weight, 0.0) for here in (self.inside, ~self.inside))
+        inner, outer = (np.where(chosen, weight, 0.0) for chosen in (self.inside, ~self.inside))
         means = [(w[:, None] * radiance).sum(axis=0) / max(w.sum(), 1e-30) for w in (inner, outer)]
         self.excess = np.maximum(radiance[self.inside] - means[1], 0.0)
         self.sun: Sun | None = None

@@ -19,38 +19,38 @@ from wgsss.scene.mesh import Mesh
 Array = npt.NDArray[Any]
 
 COVERAGE_SIZE = 1024
-"""Side of the map on which a file's texture coordinates are tested for overlaps, in texels."""
+"""Width of the map on which texture coordinates of files are tested for overlaps, texels."""
 MAX_SHARE = 1e-3
-"""Share of covered texels that may overlap, and of the surface that may be without texels: rounding, not design."""
+"""The largest share of covered texels that may overlap, and of the surface that may be without texels, by rounding."""
 MARGIN = 1e-4
-"""How far texture coordinates may leave the unit square before they are fitted into it."""
+"""Texture coordinates that leave the unit square by more than this are fitted into it."""
 
 
 @dataclass(frozen=True, eq=False)
 class RenderMesh:
-    """The render mesh: the mesh's vertices, split where texture coordinates, normals or colours differ."""
+    """A render mesh: the vertices of a mesh, split where texture coordinates, normals or colours differ."""
 
     vertex: Array
-    """int32 (R,), index into the mesh's positions"""
+    """int32 (R,): index into the positions of the mesh"""
     normals: Array
-    """float32 (R, 3), unit shading normals"""
+    """float32 (R, 3): unit shading normals"""
     atlas: Array
-    """float32 (R, 2), unique texture coordinates in 0..1, v down: no two points of the surface share one"""
+    """float32 (R, 2): unique texture coordinates in 0..1, v down: no two points of the surface have the same"""
     uvs: Array
-    """float32 (R, 2), the file's own texture coordinates for its maps, v down, or zeros"""
+    """float32 (R, 2): the texture coordinates of the file, for its maps, v down, or zeros"""
     faces: Array
-    """int32 (F, 3), indices of render vertices, the faces in the mesh's order"""
+    """int32 (F, 3): indices of render vertices; the faces are in the order of the mesh"""
     colors: Array
-    """float32 (R, 3), the file's vertex colours, linear, or ones"""
+    """float32 (R, 3): the vertex colours of the file, linear, or ones"""
     charts: Array
-    """int32 (F,), the connected piece of the atlas that a face is in, 0..C-1"""
+    """int32 (F,): the chart of each face, 0..C-1"""
 
 
 def unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
-    """The render mesh of `mesh`, cached. Its own texture coordinates are the atlas where they are unique, else a
-    new one is made: see `atlas.py`.
+    """Return the render mesh of a mesh, with an atlas. Cached.
 
-    Raises InputError where the mesh has no face with an area.
+    The atlas are the texture coordinates of the mesh if they are unique, else new ones (`atlas.new_atlas`). Raises
+    InputError if the mesh has no face with an area.
     """
     key = [mesh, library(), version(library()), gpu.name]
 
@@ -63,11 +63,12 @@ def unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
 
 
 def split(mesh: Mesh) -> RenderMesh:
-    """The render mesh of `mesh` without an atlas, for passes that need none: `atlas` and `charts` are zero."""
+    """Return the render mesh of a mesh without an atlas: `atlas` and `charts` are 0."""
     return _render_mesh(mesh, None)
 
 
 def _unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
+    """Compute the result of `unwrap`."""
     atlas = None if mesh.corner_uvs is None else _fitted(mesh.corner_uvs)
     if atlas is None or not is_unique(gpu, mesh, atlas):
         atlas = new_atlas(mesh)
@@ -77,9 +78,9 @@ def _unwrap(gpu: Gpu, mesh: Mesh) -> RenderMesh:
 
 
 def _render_mesh(mesh: Mesh, atlas: Array | None) -> RenderMesh:
-    """The mesh split where what corners carry differs: the atlas (F, 3, 2), the mesh's own uvs, normals, colours."""
-    carried = (atlas, mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors)
-    corners = [a.reshape(-1, a.shape[-1]) for a in carried if a is not None]
+    """Split the vertices of a mesh where their corners differ in the atlas (F, 3, 2) or the mesh's own attributes."""
+    attributes = (atlas, mesh.corner_uvs, mesh.corner_normals, mesh.corner_colors)
+    corners = [a.reshape(-1, a.shape[-1]) for a in attributes if a is not None]
     first, index = _distinct([mesh.faces.reshape(-1, 1), *corners])
     vertex = mesh.faces.reshape(-1)[first]
     none, white = np.zeros((len(first), 2), np.float32), np.ones((len(first), 3), np.float32)
@@ -95,13 +96,15 @@ def _render_mesh(mesh: Mesh, atlas: Array | None) -> RenderMesh:
 
 
 def atlas_vertices(vertex: Array, atlas: Array) -> Array:
-    """int64 (R,): equal for render vertices that are one point of the mesh and of the atlas, whatever their normals."""
+    """Number the points of the atlas: int64 (R,), equal for render vertices that differ in normal or colour only."""
     return _distinct([vertex.reshape(-1, 1), atlas])[1]
 
 
 def is_unique(gpu: Gpu, mesh: Mesh, corner_uvs: Array) -> bool:
-    """Whether texture coordinates (F, 3, 2) in the unit square give every point of the surface texels of its own: no
-    overlaps, and (nearly) no part of the surface without an area in the map."""
+    """Return whether texture coordinates (F, 3, 2) in the unit square can serve as an atlas.
+
+    Their triangles must not overlap, and (nearly) all of the surface must have an area in the map.
+    """
     edges = corner_uvs[:, 1:] - corner_uvs[:, :1].astype(np.float64)
     flat = np.abs(np.linalg.det(edges)) < 1e-12
     areas = np.linalg.norm(mesh.face_normals, axis=1)
@@ -121,7 +124,7 @@ def is_unique(gpu: Gpu, mesh: Mesh, corner_uvs: Array) -> bool:
 
 
 def _fitted(uvs: Array) -> Array:
-    """Texture coordinates moved and scaled into the unit square, where they leave it."""
+    """Move and scale texture coordinates into the unit square if they leave it by more than MARGIN."""
     low, high = uvs.min(axis=(0, 1)), uvs.max(axis=(0, 1))
     if low.min() < -MARGIN or high.max() > 1 + MARGIN:
         uvs = (uvs - low) / np.maximum(high - low, np.finfo(np.float32).tiny)
@@ -129,7 +132,7 @@ def _fitted(uvs: Array) -> Array:
 
 
 def _distinct(columns: list[Array]) -> tuple[Array, Array]:
-    """First rows (N,) of each distinct row of the joined columns, sorted by them, and for each row its place there."""
+    """Sort the distinct rows of joined columns. Returns the first row (N,) of each, and the rank of each row."""
     bits = [c.astype(np.int32) if c.dtype.kind == "i" else (c + np.float32(0)).view(np.int32) for c in columns]
     rows = np.ascontiguousarray(np.concatenate(bits, axis=1))
     order = np.lexsort(rows.T[::-1])

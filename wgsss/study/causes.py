@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wgsss.bake.environment import summed
+from wgsss.bake.environment import summed_radiance
 from wgsss.errors import InputError
 from wgsss.optics import Profile
 from wgsss.scene import DirectionalLight, EnvironmentLight, Scene
@@ -146,7 +146,7 @@ def suns(skies: list[EnvironmentLight]) -> tuple[Array, Array]:
     Each sun has the light of all pixels that are nearest to it.
     """
     towards = fibonacci_sphere(SUNS)
-    pixels = summed(skies).astype(np.float64)
+    pixels = summed_radiance(skies).astype(np.float64)
     if (pixels == pixels[0, 0]).all():
         return towards, np.tile(4.0 * math.pi / SUNS * pixels[0, 0], (SUNS, 1))
     height, width = pixels.shape[:2]
