@@ -60,13 +60,13 @@ class GpuTree:
 class GpuSenderMap:
     """A sender map on the GPU, without the senders that no entry reads and the vertices that receive nothing.
 
-    Its points are the senders that are read. Entries name them by their index among the points. Nodes of the tree, or
-    the smoothed means over them where the map has any, have the indices behind those of the points.
+    Its points are the senders that entries read. The sender of an entry is an index: first come the points, then the
+    nodes of the tree or, if the map has smoothed means, these.
     """
 
     sender_map: SenderMap
     points: Samples
-    """where a frame computes L_d"""
+    """the points of the surface at which a frame computes L_d"""
     entry_blocks: list[EntryBlock]
     receiving_faces: Buffer
     """u32: the render vertices of the faces with a vertex that receives light, three for each face"""
@@ -106,7 +106,7 @@ def upload(gpu: Gpu, mesh: Mesh, faces: Array, sender_map: SenderMap, *, deforms
     if deforms and sender_map.sender_samples is not None:
         points = _concatenated(points, vertex_samples(mesh))
     means = 0 if tree is None else len(tree.first)
-    if sender_map.smoothed_means is not None and tree is not None:
+    if sender_map.smoothed_means is not None:
         means = len(sender_map.smoothed_means.node)
     point_of = np.full(sender_map.sender_count, -1, np.int32)
     point_of[read] = np.arange(len(read))
