@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-import wgsss
+from wgsss import __version__
 from wgsss.gpu import default_gpu
 from wgsss.scene import EnvironmentLight, Scene
 
@@ -23,15 +23,15 @@ def adapter() -> str:
 @lru_cache(maxsize=1)
 def version() -> str:
     """Return the version of the package. In a checkout, add its commit, with "-dirty" if files have changed since."""
-    root = Path(wgsss.__file__).parents[1]
+    root = Path(__file__).parents[2]
     if not (root / ".git").exists():
-        return wgsss.__version__
+        return __version__
     command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--exclude=*"]
     try:
         commit = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
-        return wgsss.__version__
-    return f"{wgsss.__version__}+{commit}"
+        return __version__
+    return f"{__version__}+{commit}"
 
 
 def scene_digest(scene: Scene) -> str:
