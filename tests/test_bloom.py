@@ -1,4 +1,4 @@
-"""Bloom: light spreads over the pixels around, and none is lost."""
+"""Bloom: light spreads over the surrounding pixels, and its sum stays the same."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ WIDTH, HEIGHT = 100, 192  # a standard deviation of 3 pixels
 
 
 def bloomed(gpu: Any, pixels: Any, strength: float) -> Any:
-    """(H, W, 4): what becomes of the radiance `pixels`."""
+    """Return the radiance (H, W, 4) with bloom."""
     graph = Graph(gpu)
     texture = gpu.texture(pixels.astype(np.float32), "rgba32float")
-    # A pass that only copies makes a handle of it.
+    # A pass that only copies the texture, to have a handle.
     radiance = graph.draw(
         "frame/bloom",
         size=(WIDTH, HEIGHT),
@@ -42,7 +42,7 @@ def bloomed(gpu: Any, pixels: Any, strength: float) -> Any:
 
 
 @pytest.mark.parametrize("place", [(96, 50), (0, 0), (191, 2)])
-def test_what_a_bright_pixel_loses_its_surroundings_get(gpu, place):
+def test_the_light_of_a_bright_pixel_spreads_over_its_surroundings(gpu, place):
     pixels = np.zeros((HEIGHT, WIDTH, 4))
     pixels[place] = (1000.0, 500.0, 1.0, 1.0)
     found = bloomed(gpu, pixels, 0.25)
@@ -58,12 +58,12 @@ def test_what_a_bright_pixel_loses_its_surroundings_get(gpu, place):
         np.testing.assert_allclose(arriving[..., 0], expected, rtol=1e-4, atol=1e-6)
 
 
-def test_even_light_stays_as_it_is(gpu):
+def test_uniform_light_does_not_change(gpu):
     found = bloomed(gpu, np.full((HEIGHT, WIDTH, 4), (3.0, 2.0, 1.0, 1.0)), 0.5)
     np.testing.assert_allclose(found, np.broadcast_to([3.0, 2.0, 1.0, 1.0], found.shape), rtol=1e-5)
 
 
-def test_without_it_there_are_no_passes_and_with_it_radiance_stays(gpu):
+def test_bloom_of_0_has_no_passes_and_bloom_changes_the_display_only(gpu):
     scene = lit(DOWN, mesh=sphere(5.0, 300))
     images = {share: Renderer(replace(scene, bloom=share), Lambert(), (48, 64), gpu).frame() for share in (0.0, 0.3)}
     plain = Renderer(scene, Lambert(), (48, 64), gpu).frame()
@@ -74,12 +74,12 @@ def test_without_it_there_are_no_passes_and_with_it_radiance_stays(gpu):
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1])
-def test_a_share_lies_between_0_and_1(share):
+def test_shares_outside_of_0_to_1_are_refused(share):
     with pytest.raises(InputError, match="bloom"):
         replace(lit(DOWN), bloom=share)
 
 
-def test_the_command_takes_it(tmp_path, monkeypatch, capsys):
+def test_the_command_has_an_option_for_bloom(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     pictures = []
     for words in ([], ["--bloom", "0"], ["--bloom", "0.5"]):

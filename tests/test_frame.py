@@ -1,4 +1,4 @@
-"""The shared passes against closed forms: each light, shadows, the surface's reflection, the composite."""
+"""The shared passes against closed forms: each type of light, shadows, reflection at the surface, the composite."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DOWN = DirectionalLight((0, -1, 0), (2.0, 1.0, 0.5))
 
 
 def pixel_places(size=SIZE, height=20.0):
-    """World x and z of each pixel of the camera ABOVE."""
+    """Return world x and z of each pixel of the camera ABOVE."""
     t = ((np.arange(size) + 0.5) / size - 0.5) * height
     return np.meshgrid(t, t)
 
@@ -50,7 +50,7 @@ def image(gpu, scene, size=SIZE):
 
 
 def reflectance_by_quadrature(cos_o, roughness, eta, n=600):
-    """The GGX lobe's directional albedo, by summing f_r cos over a grid of half vectors."""
+    """Return the directional albedo of the GGX lobe, by a sum of f_r cos over a grid of half vectors."""
     alpha = roughness**2
     w_o = np.array([np.sqrt(1 - cos_o**2), 0, cos_o])
     # theta_h from the distribution's inverse, which crowds the grid where the lobe is
@@ -107,8 +107,8 @@ def test_point_light_falls_with_the_square_of_metres(gpu):
     np.testing.assert_allclose(got[..., 2], 3 * expected, rtol=1e-4)
 
 
-def test_point_light_amid_the_scene_casts_shadows_all_around(gpu):
-    """A lamp between a ceiling and a floor, a disc-like square under it: a cube of shadow views."""
+def test_a_point_light_inside_the_scene_casts_shadows_in_all_directions(gpu):
+    """A lamp between a ceiling and a floor has a cube of shadow views; a small square is below it."""
     lamp = PointLight((0, 6, 0), (1, 1, 1))
     ceiling = Object(plane(y=12.0).deformed(plane(y=12.0).positions * [1, 1, -1]), MATTE)
     shade = Object(plane(side=2.0, y=3.0), MATTE)
@@ -148,8 +148,8 @@ def test_sphere_matches_its_solid_angle(gpu):
     assert got == pytest.approx(np.pi * 5 * (10 / 40) ** 2, rel=0.02)
 
 
-def test_sphere_amid_the_scene_lights_all_around(gpu):
-    """Below a ceiling, a lamp lights the floor as from its solid angle, and the ceiling, which is as far, as much."""
+def test_a_sphere_light_inside_the_scene_lights_all_directions(gpu):
+    """A lamp halfway between floor and ceiling lights both by its solid angle."""
     ceiling = Object(plane(y=20.0).deformed(plane(y=20.0).positions * [1, 1, -1]), MATTE)
     light = SphereLight((0, 10, 0), 2.0, (5, 5, 5), samples=40)
     looks = ((0, 5, 0), (0, 0, 0)), ((0, 15, 0), (0, 20, 0))
@@ -179,8 +179,8 @@ def test_a_distant_light_casts_the_shadows_of_a_parallel_one(gpu, distance):
     assert differs.mean() < 40 / distance
 
 
-def test_environment_of_half_a_sky(gpu, tmp_path):
-    """A hemisphere of radiance L about +x gives pi L (1 + n_x) / 2: it is found where the image has it, turned too."""
+def test_an_environment_with_one_bright_half(gpu, tmp_path):
+    """A hemisphere of radiance L around +x gives pi L (1 + n_x) / 2, also when the environment is rotated."""
     pixels = np.zeros((64, 128, 3), np.float32)
     pixels[:, 64:] = (2, 1, 0)  # +x is right of the middle
     file = write_environment(tmp_path / "half.exr", pixels)
@@ -195,7 +195,7 @@ def test_environment_of_half_a_sky(gpu, tmp_path):
 
 
 def test_constant_environment_is_split_between_surface_and_medium(gpu):
-    """Under radiance L from all around, what is reflected is L (1 - rho_dt), and L_d is pi L times rho_dt's mean."""
+    """Under radiance L from all directions, L (1 - rho_dt) is reflected, and L_d is pi L times the mean of rho_dt."""
     got = image(gpu, lit(EnvironmentLight((2, 2, 2)), material=WHITE))
     cosines = (np.arange(400) + 0.5) / 400
     albedo = np.array([reflectance_by_quadrature(c, WHITE.roughness, WHITE.eta, n=120) for c in cosines])
@@ -212,8 +212,8 @@ def test_a_scene_lit_by_its_environment_alone_has_no_shadow_pass(gpu):
     assert any("shadow" in p.name for p in image(gpu, lit(DOWN)).graph.ran)
 
 
-def test_only_what_reflects_has_a_pass_for_that(gpu):
-    """Beside a matte ball a glossy one reflects what it does alone; where all is matte, nothing is drawn."""
+def test_only_objects_that_reflect_have_a_pass_for_reflection(gpu):
+    """A glossy ball beside a matte one reflects as it does alone; a scene with matte objects only has no such pass."""
     ball = sphere(4.0, 600)
     matte, glossy = Object(ball, MATTE, translate=(-5, 0, 0)), Object(ball, WHITE, translate=(5, 0, 0))
     found, alone, none = (
@@ -230,7 +230,7 @@ def test_only_what_reflects_has_a_pass_for_that(gpu):
 
 @pytest.mark.parametrize("amid", [False, True])
 def test_passes_leave_out_no_pixel_of_an_object(gpu, amid):
-    """They are drawn over rectangles: of an object as posed, and of the whole image where some is behind the camera."""
+    """The rectangle of a pass is that of the object as posed, or the whole image if a part is behind the camera."""
     rod = Object(capsule(20.0, 2.0, 500), WHITE, motion=BendAndSwell(length=20.0, period_s=1.0), translate=(8, 0, 0))
     pair, aside = (rod, replace(rod, translate=(-12, 0, 0))), OrthographicCamera((0, 10, 50), (0, 10, 0), height=40)
     ground, within = (Object(plane(), WHITE),), PerspectiveCamera((0, 2, 0), (0, 0, -3), fov=90)
@@ -346,7 +346,7 @@ def test_depth_is_the_distance_along_the_view(gpu, camera):
     np.testing.assert_allclose(got.aovs["normal"], np.broadcast_to([0, 1, 0], (64, 64, 3)), atol=1e-3)
 
 
-def test_nothing_seen_is_transparent_and_infinitely_far(gpu):
+def test_the_background_is_transparent_and_infinitely_far(gpu):
     got = image(gpu, lit(DOWN, mesh=plane(side=4.0)))
     assert got.pixels[0, 0].tolist() == [0, 0, 0, 0] and got.display[0, 0].tolist() == [0, 0, 0, 0]
     assert np.isinf(got.aovs["depth"][0, 0, 0])
@@ -368,12 +368,12 @@ def test_exposure_tone_curve_and_srgb(gpu, curve, expected):
     np.testing.assert_allclose(got.display[0, 0, :3], 255 * encoded, atol=0.6)
 
 
-def test_too_bright_is_white(gpu):
+def test_extreme_radiance_is_white(gpu):
     blinding = DirectionalLight((0, -1, 0), (1e12, 1e12, 1e12))
     assert (image(gpu, replace(lit(blinding), tone_map="aces")).display == 255).all()
 
 
-def test_an_open_sheet_shows_its_back_lit_from_behind(gpu):
+def test_an_open_sheet_lit_from_behind_shows_its_lit_back(gpu):
     below = replace(ABOVE, eye=(0, -50, 0))
     got = image(gpu, lit(DirectionalLight((0, 1, 0), (1, 1, 1)), camera=below))
     np.testing.assert_allclose(got.aovs["normal"][..., 1], -1, atol=1e-3)
@@ -381,7 +381,7 @@ def test_an_open_sheet_shows_its_back_lit_from_behind(gpu):
 
 
 def test_normal_map_bends_towards_its_texture_axes(gpu):
-    """A texel of (1, 0.5, 0.5) leans along u, one of (0.5, 1, 0.5) against v: green points up in the image."""
+    """A texel of (1, 0.5, 0.5) tilts the normal along u, one of (0.5, 1, 0.5) against v: green points up."""
     for texel, axis, sign in (((230, 128, 205), 0, 1), ((128, 230, 205), 2, -1)):
         maps = replace(MATTE.maps, normal=np.array([[texel]], np.uint8))
         n = image(gpu, lit(DOWN, material=replace(MATTE, maps=maps))).aovs["normal"]
@@ -413,7 +413,7 @@ def test_objects_hide_each_other_and_keep_their_materials(gpu):
     np.testing.assert_allclose(ratio[32, 32], other.profile.total, rtol=1e-4)
 
 
-def test_rotated_objects_take_their_normals_along(gpu):
+def test_normals_rotate_with_their_object(gpu):
     tilted = Mesh(plane().positions, plane().faces)
     scene = lit(DOWN, mesh=tilted)
     scene = replace(scene, objects=(Object(tilted, MATTE, rotate=(0, 0, 30)),))

@@ -1,4 +1,4 @@
-"""The device: textures there and back, what is refused, and both clocks."""
+"""The device: upload and download of textures, errors, and both clocks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wgsss.wgsl import WgslError
 
 @pytest.mark.parametrize("texture_format", [f for f in FORMATS if not f.startswith("depth")])
 @pytest.mark.parametrize("layers", [1, 3])
-def test_texels_come_back_as_they_went(gpu, texture_format, layers):
+def test_downloaded_texels_equal_uploaded_ones(gpu, texture_format, layers):
     scalar, channels = FORMATS[texture_format]
     values = np.random.default_rng(0).integers(0, 200, (layers, 5, 7, channels)).astype(scalar)
     texture = gpu.texture(values if layers > 1 else values[0], texture_format)
@@ -30,7 +30,7 @@ def test_large_textures_are_read_in_strips(gpu, monkeypatch):
     np.testing.assert_array_equal(gpu.read_texture(texture), values)
 
 
-def test_the_device_grants_no_more_than_webgpu_promises(gpu):
+def test_the_device_has_the_default_limits_of_webgpu(gpu):
     for name, limit in LIMITS.items():
         assert gpu.device.limits[name] == limit or name.startswith("min-"), name
 
@@ -47,7 +47,7 @@ def test_no_adapter_is_bad_input(monkeypatch):
 
 
 def test_hardware_is_timed_by_its_own_timestamps(gpu, modules, monkeypatch):
-    """Any adapter with the feature will do to run that path; what a software one measures is not looked at."""
+    """Any adapter with timestamps can run this code; the times of a software adapter are not checked."""
     if "timestamp-query" not in gpu.adapter.features:
         pytest.skip("the adapter has no timestamp queries")
     adapter = gpu.adapter
@@ -71,7 +71,7 @@ def test_hardware_is_timed_by_its_own_timestamps(gpu, modules, monkeypatch):
     assert graph.read(numbers).tolist() == list(range(8))
 
 
-def test_what_is_in_the_pool_is_used_again_until_it_is_let_go():
+def test_pooled_textures_are_reused_until_the_pool_is_trimmed():
     gpu = Gpu()
     key = TextureKey((3, 5, 1), "rgba8unorm", 4)
     first = gpu.acquire(key)

@@ -1,4 +1,4 @@
-"""The render graph: what is culled, shared, checked and measured."""
+"""The render graph: culling, reuse of resources, checks and times."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def graph(gpu, modules) -> Graph:
     return Graph(gpu)
 
 
-def test_only_what_is_wanted_runs(graph):
+def test_only_passes_that_the_outputs_need_run(graph):
     a = graph.draw("fill", level=1.0, size=(4, 2), label="a")
     b = graph.draw("fill", level=2.0, size=(4, 2), label="b")
     unused = graph.draw("add", left=a, right=b, label="unused")
@@ -104,7 +104,7 @@ def test_drawing_onto_a_target_keeps_it_and_renames_it(gpu, modules):
         graph.draw("add", left=first, right=second)
 
 
-def test_depth_decides_by_layer(gpu, modules):
+def test_each_layer_has_its_own_depth_test(gpu, modules):
     near, far = (FILL.replace("DEPTH: f32 = 0.5", f"DEPTH: f32 = {d}") for d in (0.2, 0.8))
     modules(near=near, far=far)
     graph = Graph(gpu)
@@ -184,7 +184,7 @@ def test_bindings_of_two_files_with_one_number_are_refused(gpu, modules):
         Graph(gpu).draw("uses", level=3.0, more=1.0, size=(2, 2))
 
 
-def test_times_say_which_clock(graph, gpu):
+def test_times_name_their_clock(graph, gpu):
     a = graph.draw("fill", level=1.0, size=(8, 8))
     b = graph.draw("add", left=a, right=a)
     graph.run(b)
@@ -196,7 +196,7 @@ def test_times_say_which_clock(graph, gpu):
     assert (graph.read(b) == 2).all()
 
 
-def test_a_value_given_twice_is_uploaded_once(graph):
+def test_equal_values_are_uploaded_once(graph):
     a = graph.draw("fill", level=7.0, size=(2, 2))
     b = graph.draw("fill", level=7.0, size=(2, 2))
     c = graph.draw("fill", level=8.0, size=(2, 2))

@@ -1,4 +1,4 @@
-"""The environment as a rough surface mirrors it."""
+"""Reflection of the environment at rough surfaces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from wgsss.scene import EnvironmentLight, OrthographicCamera
 
 
 def share_beyond(roughness: float, angle: float) -> float:
-    """How much of a lobe about a direction `angle` off the edge of a half sky lies beyond it, by random directions."""
+    """Return the share of a lobe beyond the edge of a bright half sky, by random directions; the lobe's axis is `angle`
+    away from the edge."""
     d = np.random.default_rng(0).normal(size=(400_000, 3))
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     cosine = d @ [np.sin(angle), np.cos(angle), 0]
@@ -25,9 +26,9 @@ def share_beyond(roughness: float, angle: float) -> float:
 
 
 @pytest.mark.parametrize("roughness", [0.3, 0.5, 0.8])
-def test_half_a_sky_is_mirrored_from_its_side(gpu, tmp_path, roughness):
-    """Seen from -x, a level ground mirrors the bright half around +x; seen from +x, the dark half, and the more of the
-    bright one the rougher it is."""
+def test_the_bright_half_of_a_sky_is_reflected_towards_the_other_side(gpu, tmp_path, roughness):
+    """Seen from -x, a level ground reflects the bright half around +x. Seen from +x it reflects the dark half and, the
+    rougher it is, the more of the bright one."""
     pixels = np.zeros((64, 128, 3), np.float32)
     pixels[:, 64:] = 3.0
     sky = EnvironmentLight((1, 1, 1), write_environment(tmp_path / "half.exr", pixels))

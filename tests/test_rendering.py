@@ -1,4 +1,4 @@
-"""From a scene and a method to an image, again and again."""
+"""Rendering many frames: no resources are left behind, and memory does not grow."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def test_frames_of_earlier_sizes_leave_no_textures_behind(gpu):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_a_renderer_holds_goes_with_it(gpu, method):
-    """At once, not when garbage is collected, which knows nothing of the device's memory."""
+def test_the_resources_of_a_renderer_are_freed_with_it(gpu, method):
+    """They are freed at once, not by the garbage collector, which does not know the memory of the device."""
     scene = load_scene("sphere", vertices=500)
     gc.disable()
     try:
@@ -55,11 +55,11 @@ def test_what_a_renderer_holds_goes_with_it(gpu, method):
 
 
 def resident() -> int:
-    """Bytes of memory that this process holds, the driver's included."""
+    """Return the bytes of memory that this process holds, with those of the driver."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory it holds")
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the memory of the process from Linux")
 @pytest.mark.parametrize("method", METHODS)
 def test_memory_does_not_grow_from_frame_to_frame(gpu, method):
     renderer = Renderer(load_scene("wave", vertices=1000), make_method(method, KNOBS.get(method)), (32, 32), gpu)

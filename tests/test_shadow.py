@@ -1,4 +1,4 @@
-"""Shadows under slanting light: no leaks below what nearly touches, no acne on what is lit."""
+"""Shadows of slanted light: no light leaks below objects that nearly touch, and no acne on lit surfaces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAP = 256
 
 
 def ground(gpu, scene):
-    """L_d over the ground's own texture coordinates, and the places of its texels."""
+    """Return L_d over the ground's atlas, and the positions of its texels."""
     stage = Stage(gpu, scene)
     stage.bodies[0].unwrap()
     graph = Graph(gpu)
@@ -28,7 +28,7 @@ def ground(gpu, scene):
 
 @pytest.mark.parametrize("angle", [20, 45, 70])
 @pytest.mark.parametrize("gap", [0.3, 2.0])
-def test_a_sheet_close_to_the_ground_keeps_its_light_off(gpu, angle, gap):
+def test_a_sheet_close_to_the_ground_casts_a_shadow(gpu, angle, gap):
     a = np.radians(angle)
     light = DirectionalLight((np.sin(a), -np.cos(a), 0), (1, 1, 1))
     got, x, z = ground(gpu, lit(light, extra=(Object(plane(side=10.0, y=gap), MATTE),)))

@@ -1,4 +1,4 @@
-"""What varies over a surface: textures that wrap in every way, and colours of vertices, against sampling by hand."""
+"""Textures with all wrap modes, and vertex colours, against sampling in numpy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def to_linear(bytes_: Array) -> Array:
 
 
 def fold(index: Array, size: int, wrap: str) -> Array:
-    """The texel that stands for one beyond the border (glTF 2.0, 3.8.4.4)."""
+    """Return the texel that replaces one beyond the border (glTF 2.0, 3.8.4.4)."""
     if wrap == "repeat":
         return index % size
     if wrap == "clamp":
@@ -41,7 +41,7 @@ def fold(index: Array, size: int, wrap: str) -> Array:
 
 
 def sampled(pixels: Array, uv: Array, wrap: tuple[str, str], nearest: bool) -> Array:
-    """Linear colours of an sRGB image at texture coordinates (..., 2)."""
+    """Return linear colours of an sRGB image at texture coordinates (..., 2)."""
     linear, (height, width) = to_linear(pixels), pixels.shape[:2]
 
     def texel(x: Array, y: Array) -> Array:
@@ -57,7 +57,7 @@ def sampled(pixels: Array, uv: Array, wrap: tuple[str, str], nearest: bool) -> A
 
 
 def seen_color(gpu: Gpu, scene: Any) -> Array:
-    """What the g-buffer has of the maps, linear."""
+    """Return the base colour in the g-buffer, linear."""
     graph = Graph(gpu)
     frame = shared.begin(graph, Stage(gpu, scene), (SIZE, SIZE))
     graph.run(frame.gbuffer.base_color)
@@ -65,7 +65,7 @@ def seen_color(gpu: Gpu, scene: Any) -> Array:
 
 
 @pytest.mark.parametrize(("wrap", "nearest"), list(product(product(WRAPS, WRAPS), (False, True))))
-def test_textures_wrap_and_interpolate_as_their_sampler_says(gpu: Gpu, wrap: tuple[str, str], nearest: bool) -> None:
+def test_textures_wrap_and_interpolate_by_their_sampler(gpu: Gpu, wrap: tuple[str, str], nearest: bool) -> None:
     pixels = np.random.default_rng(5).integers(0, 256, (3, 5, 3)).astype(np.uint8)
     mesh = plane(side=20.0)
     spread = replace(mesh, corner_uvs=mesh.corner_uvs * 4 - 1.5)
@@ -78,13 +78,13 @@ def test_textures_wrap_and_interpolate_as_their_sampler_says(gpu: Gpu, wrap: tup
     assert wrong.mean() < (0.02 if nearest else 1e-9), "texels' borders may fall on either side of a pixel's middle"
 
 
-def test_wrapping_of_other_kinds_is_refused() -> None:
+def test_unknown_wrap_modes_are_refused() -> None:
     with pytest.raises(ValueError, match="wrap must be two of repeat, clamp, mirror"):
         Maps(wrap=("repeat", "border"))
 
 
 def test_slopes_of_a_normal_map_are_scaled(gpu: Gpu) -> None:
-    """Light from a slant on a plane whose map leans by 30 degrees towards it, and twice as steep or not at all."""
+    """Slanted light on a plane whose normal map tilts by 30 degrees towards it; scales of 1, 2 and 0."""
     slope = np.round(np.array([-0.5, 0.0, 0.866]) * 127 + 128).astype(np.uint8)
     normal = np.broadcast_to(slope, (2, 2, 3)).copy()
     slanted = DirectionalLight((0.6, -0.8, 0.0), (1.0, 1.0, 1.0))
@@ -99,7 +99,7 @@ def test_slopes_of_a_normal_map_are_scaled(gpu: Gpu) -> None:
 
 
 def coloured_plane() -> Mesh:
-    """A plane whose vertices go from red at the left to blue at the right."""
+    """Return a plane whose vertices are red at the left and blue at the right."""
     mesh = plane(side=20.0)
     share = (mesh.positions[:, 0] / 20 + 0.5)[mesh.faces]
     return replace(mesh, corner_colors=np.stack([1 - share, np.zeros_like(share) + 0.25, share], axis=-1))
@@ -134,7 +134,7 @@ def test_light_that_enters_at_samples_has_the_colours_of_the_vertices(gpu: Gpu) 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_draws_colours_of_vertices(gpu: Gpu, name: str) -> None:
-    """Where red is none, no method shows any; where all is red, all show the white surface's red."""
+    """Where vertices have no red, neither has the image by any method; where they are red, it is that of white."""
     white = plane(side=20.0, cells=4)
     share = np.repeat((white.positions[white.faces].mean(axis=1)[:, :1] > 0).astype(np.float32)[:, None], 3, axis=1)
     halves = replace(white, corner_colors=np.concatenate([share, np.ones_like(share), np.ones_like(share)], axis=2))

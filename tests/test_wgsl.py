@@ -1,4 +1,4 @@
-"""Reading modules: imports, errors, layouts. Offsets are proved by a GPU that reads each field back."""
+"""Reading WGSL modules: imports, errors, memory layouts. The GPU reads each field back from the packed bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies that a motion hides by scaling them to nothing, and scenes far from the origin, by every method."""
+"""Bodies that a motion hides by scaling them to zero, and scenes far from the origin, by every method."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KNOBS: dict[str, dict[str, Any]] = {"deon07": {"map_size": 128}, "jimenez08": {"
 
 @dataclass(frozen=True)
 class Vanishing:
-    """There up to half a second, then scaled to nothing, as glTF files hide parts."""
+    """Visible up to half a second, then scaled to zero, as glTF files hide parts."""
 
     period_s: float = 1.0
 
@@ -53,7 +53,7 @@ def two(gpu: Gpu, name: str) -> Renderer:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_what_is_scaled_to_nothing_is_not_drawn(gpu: Gpu, name: str) -> None:
+def test_bodies_scaled_to_zero_are_not_drawn(gpu: Gpu, name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         renderer = two(gpu, name)
@@ -65,7 +65,7 @@ def test_what_is_scaled_to_nothing_is_not_drawn(gpu: Gpu, name: str) -> None:
     np.testing.assert_allclose(again.pixels, there.pixels, rtol=1e-4, atol=1e-5)  # sam keeps a share of M_back
 
 
-def test_the_reference_leaves_out_what_is_scaled_to_nothing(gpu: Gpu) -> None:
+def test_the_reference_leaves_out_bodies_scaled_to_zero(gpu: Gpu) -> None:
     stage = Stage(gpu, two(gpu, "lambert").stage.rest, time_s=0.75)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
@@ -97,7 +97,7 @@ def test_a_scene_a_kilometre_away_is_drawn_as_at_the_origin(gpu: Gpu, name: str)
     np.testing.assert_allclose(there, here, rtol=1e-4, atol=1e-5)
 
 
-def test_what_is_near_the_origin_is_not_moved() -> None:
+def test_a_scene_near_the_origin_is_not_moved() -> None:
     scene = lit_ball((30.0, 0.0, 0.0))
     assert scene.near_origin() is scene
     turned = replace(scene, camera=replace(scene.camera, turn=10.0))

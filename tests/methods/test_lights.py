@@ -23,7 +23,7 @@ KNOBS: dict[str, dict[str, Any]] = {
 TYPES = "directional", "point", "area", "environment", "sphere", "all", "none"
 SCENES = "leaf", "ear"
 LEAST = -1e-4
-"""of the greatest: what rounding may take below zero"""
+"""the lowest value that rounding may cause, as a share of the largest one"""
 
 
 @lru_cache

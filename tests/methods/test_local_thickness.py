@@ -1,4 +1,4 @@
-"""Light through local thickness: the printed formula in numpy, and the diffusion integral."""
+"""Light through local thickness against the paper's formula in numpy and against the reference integral."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ ALBEDO = WHITE.profile.total
 
 @pytest.fixture
 def even(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same thickness everywhere."""
+    """Give all vertices the same thickness."""
     monkeypatch.setattr(
         module, "local_thickness", lambda mesh, profile: np.broadcast_to(THICKNESS, (len(mesh.positions), 3)).copy()
     )
 
 
 def seen(gpu: Gpu, scene: Scene, size: int = 33, **knobs: Any) -> dict[str, Any]:
-    """What a frame of barre11 has, by name, and where it is not background."""
+    """Return layers of a frame by barre11, by name, and where the object is."""
     image = Renderer(scene, make_method("barre11", knobs), (size, size), gpu).frame(
         aovs=["M_back", "normal", "irradiance"], timed=False
     )
@@ -58,7 +58,7 @@ def seen(gpu: Gpu, scene: Scene, size: int = 33, **knobs: Any) -> dict[str, Any]
 
 
 def unpacked(thickness: Any, *, coloured: bool = True, several: bool = False) -> Any:
-    """What is left of a thickness after 8 bits, in numpy; `several`: where materials' parameters take a bit each of red
+    """Return a thickness after quantisation to 8 bits; `several`: where materials' parameters take a bit each of red
     and green, or two of grey."""
     root = np.sqrt(thickness.astype(np.float64))
     left = 127.0 if several else 255.0
@@ -70,8 +70,8 @@ def unpacked(thickness: Any, *, coloured: bool = True, several: bool = False) ->
 @pytest.mark.parametrize(
     "knobs", [{}, {"distortion": 0.4, "power": 2.5, "scale": 1.7, "ambient": 0.2}, {"power": 1, "ambient": 0}]
 )
-def test_the_printed_formula(gpu: Gpu, even: None, stored: str, knobs: dict[str, Any]) -> None:
-    """Of parallel light, on a ball, whose normals an orthographic camera sees."""
+def test_M_back_obeys_the_formula_of_the_paper(gpu: Gpu, even: None, stored: str, knobs: dict[str, Any]) -> None:
+    """Parallel light on a ball; an orthographic camera gives its normals."""
     found = seen(gpu, lit(BELOW, mesh=BALL), stored=stored, **knobs)
     k = {"distortion": 0.0, "power": 2.0, "scale": 0.8, "ambient": 0.05, **knobs}
     towards = -np.array(BELOW.direction) / np.linalg.norm(BELOW.direction)
@@ -87,7 +87,7 @@ def test_the_printed_formula(gpu: Gpu, even: None, stored: str, knobs: dict[str,
 
 @pytest.mark.parametrize("stored", MODES)
 def test_light_falls_off_and_the_view_has_perspective(gpu: Gpu, even: None, stored: str) -> None:
-    """Of a point below and a camera above, near by, on a flat plate: fLightAttenuation is that of the light at x_o."""
+    """A point light closely below a flat plate and a camera closely above: fLightAttenuation is that at x_o."""
     lamp, eye = np.array([5.0, -40.0, 3.0]), np.array([-6.0, 50.0, 4.0])
     camera = PerspectiveCamera(tuple(eye), (-6.0, 0.0, 4.0), up=(0, 0, -1), fov=20.0)
     scene = lit(PointLight(tuple(lamp), (0.1, 0.2, 0.3)), mesh=plane(side=60.0, cells=60), camera=camera)
@@ -104,7 +104,7 @@ def test_light_falls_off_and_the_view_has_perspective(gpu: Gpu, even: None, stor
 
 
 def test_a_product_beyond_1_saturates(gpu: Gpu, even: None) -> None:
-    """L' is longer than L where the normal faces away, as normals of a file may: 1.9 to the power of 4 would be 13."""
+    """L' is longer than L where the normal faces away: without saturation, 1.9 to the power of 4 would be 13."""
     flat = plane()
     bent = replace(flat, corner_normals=np.broadcast_to(np.array([0, -1, 0], np.float32), (len(flat.faces), 3, 3)))
     found = seen(
@@ -114,8 +114,8 @@ def test_a_product_beyond_1_saturates(gpu: Gpu, even: None) -> None:
 
 
 @pytest.mark.parametrize("stored", MODES)
-def test_an_environment_shines_from_behind(gpu: Gpu, even: None, stored: str) -> None:
-    """By scale + ambient of the irradiance of a surface that faces away: that of an even sky is the same all round."""
+def test_an_environment_counts_as_light_from_straight_behind(gpu: Gpu, even: None, stored: str) -> None:
+    """M_back is scale + ambient times the irradiance of a surface that faces away, here of a uniform sky."""
     scene = lit(EnvironmentLight((0.5, 0.4, 0.3)), mesh=BALL)
     found = seen(gpu, scene, stored=stored, scale=0.6, ambient=0.1)
     inside = found["normal"][..., 1] > 0.2
@@ -124,7 +124,7 @@ def test_an_environment_shines_from_behind(gpu: Gpu, even: None, stored: str) ->
     np.testing.assert_allclose(found["M_back"][inside], wanted[inside], rtol=5e-3)
 
 
-def test_of_a_sky_the_other_half_counts(gpu: Gpu, even: None, tmp_path: Any) -> None:
+def test_the_half_of_the_sky_on_the_far_side_counts(gpu: Gpu, even: None, tmp_path: Any) -> None:
     pixels = np.zeros((32, 64, 3), np.float32)
     pixels[16:] = 1.0  # light from below
     light = EnvironmentLight(file=write_environment(tmp_path / "below.exr", pixels))
@@ -135,8 +135,8 @@ def test_of_a_sky_the_other_half_counts(gpu: Gpu, even: None, tmp_path: Any) -> 
 
 
 @pytest.mark.parametrize("name", ["skin1", "marble"])
-def test_a_plate_under_an_even_sky_is_the_integrals(gpu: Gpu, name: str) -> None:
-    """It transmits total eps(h) L_d, eps being the share of the profile beyond its thickness."""
+def test_a_plate_under_a_uniform_sky_equals_the_integral(gpu: Gpu, name: str) -> None:
+    """The plate transmits R_tot eps(h) L_d, where eps is the share of the profile beyond its thickness h."""
     material = replace(MATERIALS[name], specular=0.0)
     plate = slab((400.0, 3.0, 400.0), vertices=2500)
     scene = lit(EnvironmentLight((1, 1, 1)), mesh=plate, material=material)
@@ -147,7 +147,7 @@ def test_a_plate_under_an_even_sky_is_the_integrals(gpu: Gpu, name: str) -> None
     )
 
 
-def test_lights_add_up_and_nothing_casts_shadows(gpu: Gpu, even: None) -> None:
+def test_lights_add_up_and_cast_no_shadows(gpu: Gpu, even: None) -> None:
     lamp = PointLight((0.0, -40.0, 0.0), (0.1, 0.1, 0.1))
     area = RectLight((10, -50, 0), (0, 1, 0), (1, 0, 0), 20, 20, radiance=(2, 2, 2), samples=4)
     alone = [seen(gpu, lit(light, mesh=BALL))["M_back"] for light in (lamp, area, BELOW)]
@@ -173,7 +173,7 @@ def test_the_base_colour_multiplies(gpu: Gpu, even: None) -> None:
 
 
 @pytest.mark.parametrize("stored", MODES)
-def test_grey_lets_through_as_much_white_light(gpu: Gpu, even: None, stored: str) -> None:
+def test_grey_thickness_transmits_as_much_white_light_as_coloured(gpu: Gpu, even: None, stored: str) -> None:
     scene = lit(DirectionalLight((0, 1, 0), (2, 2, 2)), mesh=BALL)
     coloured, grey = (
         seen(gpu, scene, 9, scale=1.0, ambient=0.0, thickness=kind, stored=stored)["M_back"][4, 4]
@@ -195,8 +195,8 @@ def test_grey_lets_through_as_much_white_light(gpu: Gpu, even: None, stored: str
         ("marble", True, (0.01, 0.01, 0.01)),
     ],
 )
-def test_what_8_bits_lose(gpu: Gpu, name: str, several: bool, most: tuple[float, ...]) -> None:
-    """RMS over the ear, of M_back in parallel light, which is the thickness times a constant.
+def test_the_error_of_8_bits(gpu: Gpu, name: str, several: bool, most: tuple[float, ...]) -> None:
+    """RMS error over the ear of M_back in parallel light, which is the thickness times a constant.
 
     As printed, without roots and with blue 3/255 too high, it would be 26 and 832 % of green and blue in skin.
     """
@@ -214,7 +214,7 @@ def test_what_8_bits_lose(gpu: Gpu, name: str, several: bool, most: tuple[float,
     assert lost.max() > 1e-4  # it is packed
 
 
-def test_each_object_has_its_own_and_sheets_have_none(gpu: Gpu) -> None:
+def test_each_object_has_its_own_thickness_and_sheets_have_none(gpu: Gpu) -> None:
     small = sphere(radius=2.0, vertices=1000)
     objects = [
         Object(small, replace(MATERIALS["marble"], specular=0.0), translate=(-5, 0, 0)),
@@ -242,7 +242,7 @@ OWN = ((0.4, 2.5, 0.2), None, (0.0, 1.0, 0.0), (0.2, 8.0, 0.05), (0.4, 2.5, 0.2)
 @pytest.mark.parametrize("stored", MODES)
 @pytest.mark.parametrize("kind", ["coloured", "grey"])
 def test_materials_may_have_their_own_parameters(gpu: Gpu, even: None, stored: str, kind: str) -> None:
-    """Five balls and four sets of parameters, all in one frame: by the printed formula, each with its own."""
+    """Five balls with four sets of parameters in one frame: each obeys the formula with its own set."""
     ball, knobs = sphere(radius=4.0, vertices=4000), {"distortion": 0.1, "power": 3.0, "scale": 1.5, "ambient": 0.1}
     objects = tuple(
         Object(ball, replace(MATTE, transport=own), translate=(10.0 * i - 20.0, 0, 0)) for i, own in enumerate(OWN)
@@ -304,12 +304,12 @@ def test_a_g_buffer_has_room_for_four_sets_of_parameters(gpu: Gpu, even: None) -
     Renderer(lit(BELOW, mesh=plane(), extra=tuple(objects[:3])), make_method("barre11", {"stored": "g-buffer"}), (8, 8))
 
 
-def test_where_nothing_comes_through_nothing_is_drawn(gpu: Gpu) -> None:
+def test_a_scene_that_transmits_no_light_has_no_passes(gpu: Gpu) -> None:
     graph = Renderer(lit(BELOW), make_method("barre11"), (8, 8), gpu).frame().graph
     assert not any(item.module.name.startswith("thickness") for item in graph.passes)
 
 
-def test_what_moves_keeps_its_thickness(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_object_that_deforms_keeps_its_thickness(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     meshes: list[Any] = []
 
     def local_thickness(mesh: Any, profile: Any) -> Any:
@@ -325,8 +325,8 @@ def test_what_moves_keeps_its_thickness(gpu: Gpu, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("name", ["skin", "marble"])
-def test_the_ear_transmits_what_the_integral_has(gpu: Gpu, name: str) -> None:
-    """The mean within a quarter, which the defaults are fitted to; and its places, too."""
+def test_the_ear_transmits_as_much_as_the_integral(gpu: Gpu, name: str) -> None:
+    """The mean, to which the defaults are fitted, is within a quarter of the reference; the images correlate."""
     scene = load_scene("ear", vertices=2000)
     (body,) = scene.objects
     scene = replace(scene, objects=(replace(body, material=MATERIALS[name]),))
@@ -339,14 +339,14 @@ def test_the_ear_transmits_what_the_integral_has(gpu: Gpu, name: str) -> None:
 
 
 @pytest.mark.parametrize("stored", MODES)
-def test_the_same_bits_again(gpu: Gpu, stored: str) -> None:
+def test_same_scene_same_bits(gpu: Gpu, stored: str) -> None:
     scene = load_scene("leaf", vertices=1500)
     first, second = (seen(gpu, scene, 64, stored=stored)["M_back"] for _ in range(2))
     np.testing.assert_array_equal(first, second)
     assert np.isfinite(first).all() and first.max() > 0.0
 
 
-def test_words_that_are_not_known_are_refused() -> None:
+def test_unknown_choices_are_refused() -> None:
     with pytest.raises(InputError, match="unknown thickness 'gray'; did you mean 'grey'"):
         LocalThickness(thickness="gray")
     with pytest.raises(InputError, match="stored must be one of vertices, g-buffer"):

@@ -32,7 +32,7 @@ def rms(values: np.ndarray) -> float:
 
 
 class Passes:
-    """One frame's passes of the method over a scene, read back: M at the pixels seen, and what it is made of."""
+    """The passes of one frame, read back: M at the pixels that show objects, and its inputs."""
 
     def __init__(self, gpu, scene, method=None, size=(24, 24), time_s=0.0):
         self.method = method or PointCloud()
@@ -66,7 +66,7 @@ class Passes:
 @pytest.mark.parametrize("spacing", [0.7, 1.0, 2.5])
 @pytest.mark.parametrize("material", [MARBLE, SKIN], ids=["marble", "skin1"])
 def test_a_plane_in_uniform_light_reflects_the_profiles_total(gpu, material, spacing):
-    """Samples that stand for their areas alone are off by 5 to 9 % at such spacings, and by 300 % at the widest."""
+    """Without the share of L_d at the pixel, the error would be 5 to 9 % at such spacings, and 300 % at the widest."""
     camera = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=6)
     ground = Object(plane(side=40, cells=20), material)
     scene = replace(lit(DirectionalLight((0, -1, 0), (1, 1, 1)), material=material, camera=camera), objects=(ground,))
@@ -94,7 +94,7 @@ def test_a_sphere_in_uniform_light(gpu, radius):
 
 
 def brute_force(found: Passes) -> tuple[np.ndarray, np.ndarray]:
-    """M_front and M_back at the pixels as the sum over all samples, in double precision."""
+    """Return M_front and M_back at the pixels as the sum over all samples, in double precision."""
     body = found.stage.bodies[0]
     cloud = found.method.cloud(body)
     at = body.at(cloud.samples)
@@ -119,8 +119,8 @@ def ball(gpu, epsilon, spacing=2.0):
 
 
 @pytest.mark.parametrize("shape", ["ball", "ear"])
-def test_without_standing_nodes_it_is_the_sum_over_the_samples(gpu, shape):
-    """In the hollows of the ear, some of what is turned away lies above the horizon."""
+def test_without_inner_nodes_M_is_the_sum_over_the_samples(gpu, shape):
+    """In the hollows of the ear, some samples that face away lie above the tangent plane."""
     if shape == "ball":
         found = ball(gpu, EXACT)
     else:
@@ -131,8 +131,8 @@ def test_without_standing_nodes_it_is_the_sum_over_the_samples(gpu, shape):
     assert rms(found.M_back - back) < 2e-3 * rms(back), "normals have 11 bits"
 
 
-def test_the_error_of_a_standing_node_grows_with_epsilon(gpu):
-    """Published: 0.03, 0.6, 1.3, 4.4 and 18 % at most, at these, on the lit side."""
+def test_the_error_of_nodes_grows_with_epsilon(gpu):
+    """Mikkelsen 2009 reports largest errors of 0.03, 0.6, 1.3, 4.4 and 18 % at these values, on the lit side."""
     exact = ball(gpu, EXACT, spacing=1.0)
     bright = exact.M > 0.05 * exact.M.max(axis=0)
     errors, most = [], []
@@ -148,15 +148,15 @@ def test_the_error_of_a_standing_node_grows_with_epsilon(gpu):
 
 
 @pytest.mark.parametrize("name", ["ear", "leaf"])
-def test_the_split_survives_standing_nodes_that_hold_both_sides(gpu, name):
+def test_nodes_with_samples_of_both_sides_are_split_correctly(gpu, name):
     scene = load_scene(name, vertices=2000)
     exact, found = (Passes(gpu, scene, PointCloud(epsilon=e, spacing=6.0), size=(32, 32)) for e in (EXACT, 0.3))
     assert rms(found.M - exact.M) < 0.015 * rms(exact.M)
     assert rms(found.M_back - exact.M_back) < 0.02 * rms(exact.M_back)
 
 
-def test_what_faces_sideways_is_front(gpu):
-    """On a block, seen along an axis, only the far face is turned away from the near one."""
+def test_samples_at_a_right_angle_belong_to_M_front(gpu):
+    """On a block seen along an axis, only the far face is turned away from the near one."""
     camera = OrthographicCamera((0, 0, 50), (0, 0, 0), height=8)
     light = DirectionalLight((-1, 0, 0), (1, 1, 1))  # onto one of the narrow faces
     found = Passes(gpu, lit(light, mesh=slab((12, 12, 4)), material=MARBLE, camera=camera))
@@ -164,7 +164,7 @@ def test_what_faces_sideways_is_front(gpu):
     np.testing.assert_array_equal(found.M_back, 0.0)
 
 
-def test_a_node_that_holds_the_pixel_never_stands(gpu):
+def test_a_node_that_contains_the_pixel_is_never_used_as_a_whole(gpu):
     found = ball(gpu, 2.0, spacing=1.0)
     body = found.stage.bodies[0]
     tree = found.method.cloud(body).tree
@@ -175,8 +175,8 @@ def test_a_node_that_holds_the_pixel_never_stands(gpu):
         assert np.linalg.norm(corners - found.nodes["position"][k], axis=1).max() <= found.nodes["reach"][k] * 1.0001
 
 
-def test_the_nodes_hold_what_their_samples_let_in(gpu):
-    """Half of the ball is dark: nodes there have no flux to weight their place by."""
+def test_nodes_have_the_flux_of_their_samples(gpu):
+    """Half of the ball is dark: nodes there have no flux that could weight their position."""
     found = ball(gpu, 0.3)
     cloud = found.method.cloud(found.stage.bodies[0])
     tree, at = cloud.tree, found.stage.bodies[0].at(cloud.samples)
@@ -193,7 +193,7 @@ def test_the_nodes_hold_what_their_samples_let_in(gpu):
     np.testing.assert_array_equal(found.nodes["next"], tree.next)
 
 
-def test_no_light_gives_nothing(gpu):
+def test_without_light_M_is_0(gpu):
     found = Passes(gpu, lit(mesh=sphere(5.0, 500), material=SKIN, camera=FRONT))
     np.testing.assert_array_equal(found.M, 0.0)
 
@@ -205,7 +205,7 @@ def test_the_same_scene_gives_the_same_bits(gpu):
 
 
 def test_samples_move_with_the_mesh(gpu):
-    """A finger that has bent is what a finger made bent is, within what other samples change."""
+    """A finger that has bent equals a finger modelled bent, within the differences of their samples."""
     scene = load_scene("wave", vertices=2000)
     moved = Passes(gpu, scene, size=(32, 32), time_s=0.7)
     (finger,) = scene.at(0.7).objects
@@ -278,8 +278,8 @@ def test_a_kernel_comes_from_the_cache(tmp_path, monkeypatch):
     np.testing.assert_array_equal(first.packed, second.packed)
 
 
-def test_where_nothing_is_seen_there_is_nothing(gpu):
-    """The textures that it writes may hold what an earlier frame left there."""
+def test_M_is_0_in_the_background(gpu):
+    """The pass must clear its textures, which may hold texels of an earlier frame."""
     light = DirectionalLight((0, 0, -1), (1, 1, 1))
     for height in (4, 18):  # first the sphere fills the image, then not
         camera = replace(FRONT, height=height)
@@ -290,13 +290,13 @@ def test_where_nothing_is_seen_there_is_nothing(gpu):
     assert image.aovs["M_front"][empty].max() == 0.0 and image.aovs["M_back"][empty].max() == 0.0
 
 
-def test_the_spacing_is_of_the_middle_channels_path():
+def test_the_spacing_is_in_mean_free_paths_of_the_middle_channel():
     np.testing.assert_allclose(mean_free_path(MATERIALS["marble"]), 1 / (2.62 + 0.0041))
     skin = MATERIALS["skin"]
     np.testing.assert_allclose(skin.profile.enclosed(mean_free_path(skin))[1], 0.5, atol=1e-6)
 
 
-def test_bodies_of_one_mesh_have_a_sky_each(gpu):
+def test_bodies_of_one_mesh_receive_different_shares_of_the_sky(gpu):
     """Of two balls the left one is below a roof: it is lit as where the other is of another mesh, with the same
     vertices."""
     ball = sphere(radius=3.0, vertices=800)

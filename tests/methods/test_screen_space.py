@@ -38,7 +38,7 @@ ABOVE = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=16)
 
 
 def shade(height: float = 40.0) -> Object:
-    """Keeps SLANTED off the half x < 0 of the floor."""
+    """Return a sheet that blocks SLANTED on the half x < 0 of the floor."""
     half = Mesh(plane(side=50.0).positions - np.float32([25, 0, 0]), plane().faces)
     return Object(half, MATTE, translate=(0, height, 40))
 
@@ -55,7 +55,7 @@ def M_of(gpu, scene, method, size):
 
 
 def places(gpu, scene, size):
-    """World position (H, W, 3) and object of each pixel."""
+    """Return world position (H, W, 3) and object id of each pixel."""
     graph = Graph(gpu)
     frame = shared.begin(graph, Stage(gpu, scene), (size, size))
     graph.run(frame.gbuffer.depth, frame.gbuffer.gbuffer_id)
@@ -95,7 +95,7 @@ def test_edge_with_more_taps(gpu):
 
 @pytest.mark.parametrize("degrees", [0, 11.25, 22.5, 33.75, 45])
 def test_edge_at_any_angle_to_the_passes_by_two_products(gpu, degrees):
-    """Red, which has the largest share of what is wide."""
+    """Checked in red, the channel with the widest response."""
     camera = turned(degrees, 8, 192)
     assert edge_error(gpu, camera, ScreenSpace(taps=17, kernel="svd"), 192)[0] < 0.02
 
@@ -135,7 +135,7 @@ def test_edge_seen_in_perspective(gpu, side):
 
 @pytest.mark.parametrize("kernel", ["line-spread", "svd", "radial"])
 def test_uniform_light(gpu, kernel):
-    """On a plane to its very border, and on a sphere: nothing is lost, nothing is added."""
+    """On a plane up to its border the light neither increases nor decreases."""
     scene = lit(DirectionalLight((0, -1, 0), (3, 2, 1)), mesh=plane(side=10.0), material=SKIN, camera=ABOVE)
     M = M_of(gpu, scene, ScreenSpace(kernel=kernel), 96)
     on = np.abs(places(gpu, scene, 96)[0][..., [0, 2]]).max(axis=2) < 5
@@ -152,7 +152,7 @@ def test_uniform_light_on_a_sphere(gpu, monkeypatch):
     assert (M[~on] == 0).all()
 
 
-def test_every_pixel_of_what_moves_and_of_what_surrounds_the_camera(gpu):
+def test_all_pixels_of_moving_objects_and_of_objects_around_the_camera_are_drawn(gpu):
     """The passes are drawn over rectangles: those of an object as posed, and the whole picture where some of it lies
     behind the camera."""
     light = EnvironmentLight((1, 1, 1))
@@ -192,15 +192,15 @@ def test_nothing_bleeds_across_a_step(gpu, height):
     assert M[:, 65:].max() < 2e-3  # of the filtered texel between white and black
 
 
-def test_bends_let_light_through(gpu):
-    """The same without a step: the floor's black half is lit through the white one."""
+def test_light_crosses_a_bend(gpu):
+    """The same without a step: light from the white half of the floor reaches the black one."""
     mesh, material = painted(plane(side=20.0), 255, 0)
     M = M_of(gpu, lit(DOWN, mesh=mesh, material=material, camera=ABOVE), ScreenSpace(taps=33), 128)
     x = ((np.arange(128) + 0.5) / 128 - 0.5) * 16
     np.testing.assert_allclose(M[64], WIDE.gaussians.step_response(-x), atol=0.02)
 
 
-def test_bent_surfaces_let_light_through(gpu):
+def test_light_spreads_over_bent_surfaces(gpu):
     """Over a cylinder of 6 mm, as far as 50 degrees from the top, light goes by the length of the arc."""
     flat, material = painted(plane(side=20.0, cells=64), 255, 0)
     angle = np.clip(flat.positions[:, 0] / 6, -1.6, 1.6)
@@ -250,7 +250,7 @@ def test_the_base_colour_may_be_applied_before_or_after(gpu):
 
 @pytest.mark.parametrize("count", [1, 5, 17, 65])
 def test_taps(count):
-    """What a level's taps weigh is the kernel, and their cost is their number."""
+    """The weights of a level sum to the kernel, and the number of taps is the knob's."""
     (term,) = line_spread(SKIN_GAUSSIANS)
     taps = Taps(term, term, count // 2)
     levels = len(taps.pixels_per_mm)
@@ -263,8 +263,8 @@ def test_taps(count):
 
 
 @pytest.mark.parametrize("level", [150, 200, 230])
-def test_no_other_pixels_are_as_true_to_an_edge(level):
-    """Of all threes of pixels, with a value between each two of them that no other is better than."""
+def test_the_pixels_of_taps_have_the_smallest_error_at_an_edge(level):
+    """Compared with all triples of pixels, each with the best weights."""
     (term,) = line_spread(SKIN_GAUSSIANS)
     taps = Taps(term, term, 3)
     edges = np.arange(0.5, 40)
@@ -284,7 +284,7 @@ def test_no_other_pixels_are_as_true_to_an_edge(level):
 
 
 @pytest.mark.parametrize("size", [64, 256])
-def test_taps_are_as_dense_as_the_blur_asks_for(gpu, size):
+def test_the_number_of_taps_follows_from_the_width_of_the_kernel(gpu, size):
     """Half of a Gaussian's light leaves within sqrt(2 v ln 2)."""
     below = replace(ABOVE, height=20)
     beside = PerspectiveCamera((30, 10, 0), (0, 10, 0), fov=40)
@@ -299,7 +299,7 @@ def test_taps_are_as_dense_as_the_blur_asks_for(gpu, size):
             assert taps_for(frame, stage.bodies[0]) == taps
 
 
-def test_every_object_has_taps_of_its_own_unless_told(gpu):
+def test_each_object_has_its_own_number_of_taps_by_default(gpu):
     wide = replace(MATTE, gaussians=SumOfGaussians(np.array([200.0]), np.array([[0.9, 0.5, 0.1]])))
     near, far = (replace(plane(side=20.0), name=name) for name in ("near", "far"))
     scene = lit(DOWN, mesh=near, material=SKIN, camera=ABOVE, extra=(Object(far, wide, translate=(0, -3, 0)),))

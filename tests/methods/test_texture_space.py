@@ -30,13 +30,13 @@ SIZE = 256
 
 
 def half_shade(angle: float = 0.0) -> Object:
-    """Covers the half x < 0 of what lies below; turned by `angle` degrees about y."""
+    """Return a sheet over the half x < 0, rotated by `angle` degrees about y."""
     half = Mesh(plane(side=60.0).positions + np.float32([-30, 15, 0]), plane().faces)
     return Object(half, MATTE, rotate=(0, angle, 0))
 
 
 def with_uvs(mesh: Mesh, angle: float, stretch: float) -> Mesh:
-    """The plane's texture coordinates turned and stretched, inside the unit square."""
+    """Return the plane's texture coordinates rotated and stretched, inside the unit square."""
     a = np.radians(angle)
     t = (mesh.corner_uvs - 0.5) @ np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
     t = t * [1, 1 / stretch]
@@ -60,7 +60,7 @@ def edge_difference(gpu, mesh, map_size, material=MARBLE, rotate=(0, 0, 0), angl
 
 
 def edge_error(gpu, mesh, map_size, *rest, **more):
-    """The largest of these differences."""
+    """Return the largest of these differences."""
     return np.abs(edge_difference(gpu, mesh, map_size, *rest, **more)).max()
 
 
@@ -84,7 +84,7 @@ def test_edge_at_an_angle_to_the_blurs(gpu, angle):
 
 
 def test_edge_by_gaussians_to_their_ends(gpu):
-    """Cut off at two sigmas instead of three, and normalised, it would be off by 0.02."""
+    """If the Gaussian were cut off at two sigmas instead of three, the error would be 0.02."""
     for variances in ([4.0], [1.0, 4.0]):
         weights = np.eye(len(variances))[-1][:, None] * [0.9, 0.5, 0.1]
         wax = replace(MATTE, gaussians=SumOfGaussians(np.array(variances), weights))
@@ -110,18 +110,18 @@ def test_edge_where_the_directions_of_a_blur_are_undefined(gpu):
 
 
 def test_edge_on_skin(gpu):
-    """Its narrowest Gaussian has a sigma of 0.08 mm, two texels here; on coarser maps blue errs by more."""
+    """The narrowest Gaussian has a sigma of 0.08 mm, two texels here; on coarser maps the error of blue is larger."""
     assert edge_error(gpu, plane(cells=4), 1024, SKIN) < 0.015
 
 
 def test_edge_on_a_material_with_variances_of_its_own_per_channel(gpu):
-    """They are fitted by shared ones, which the blurs need."""
+    """The blurs need variances that the channels share: they are fitted."""
     own = SumOfGaussians(np.array([[0.1, 0.2, 0.3], [3.0, 2.0, 1.0]]), np.array([[0.5, 0.2, 0.7], [0.1, 0.2, 0.3]]))
     assert edge_error(gpu, plane(cells=4), 512, replace(MATTE, gaussians=own)) < 0.015
 
 
 def diffused_map(gpu, scene, monkeypatch, map_size=512):
-    """M_front over the atlas, all of its Gaussians on maps of one size; the render mesh and its charts."""
+    """Return M_front over the atlas, with maps of one size for all Gaussians; the render mesh; and its charts."""
     monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)
     stage = Stage(gpu, scene)
     method = TextureSpace(map_size=map_size)
@@ -141,7 +141,7 @@ def diffused_map(gpu, scene, monkeypatch, map_size=512):
     "mesh", [plane(), slab(), sphere(10.0, 2000), ear(2000)], ids=["plane", "slab", "sphere", "ear"]
 )
 def test_uniform_light_stays_uniform(gpu, mesh, monkeypatch):
-    """Nothing is lost at borders, open ones included, nor added."""
+    """At chart borders, open ones included, the light neither increases nor decreases."""
     monkeypatch.setattr("wgsss.stage.sky_visibility", lambda scene, lights, positions, normals: np.ones(len(positions)))
     M, _, charts = diffused_map(gpu, lit(EnvironmentLight((1, 1, 1)), mesh=mesh, material=SKIN), monkeypatch)
     used = gpu.read_texture(charts.ids)[..., 0] > 0
@@ -176,8 +176,8 @@ def test_chart_borders_of_a_sphere_are_invisible(gpu, monkeypatch):
     assert across <= 2 * max(jumps), f"{across:.4f} across borders, {max(jumps):.4f} inside charts"
 
 
-def test_wide_blurs_find_their_way_over_jagged_borders(gpu):
-    """Along a cylinder that is lit from the side nothing changes, though xatlas cuts it into strips with teeth."""
+def test_wide_blurs_cross_jagged_borders_correctly(gpu):
+    """M is constant along a cylinder lit from the side, although xatlas cuts it into strips with jagged borders."""
     wide = replace(MATTE, gaussians=SumOfGaussians(np.array([0.2, 9.0]), np.array([[0.3] * 3, [0.6] * 3])))
     camera = OrthographicCamera((0, 0, 50), (0, 0, 0), height=24)
     rod = capsule(length=80.0, radius=9.0, vertices=3000)
@@ -189,7 +189,7 @@ def test_wide_blurs_find_their_way_over_jagged_borders(gpu):
 
 
 def test_blurs_go_round_a_thin_bar(gpu, monkeypatch):
-    """Of four faces one is lit: over the perimeter of 6 mm light spreads by 2 mm, and taps cross up to four edges."""
+    """One of four faces is lit. Light spreads by 2 mm over a perimeter of 6 mm, so that taps cross up to four edges."""
     monkeypatch.setattr(texture_space, "MOST_HALVINGS", 0)
     wide = replace(MATTE, gaussians=SumOfGaussians(np.array([4.0]), np.ones((1, 3))))
     bar = slab(size=(1.5, 22.0, 1.5), vertices=1000)
@@ -217,7 +217,7 @@ def test_vanishing_width_is_lambert(gpu):
 
 @pytest.mark.parametrize("power", [1e-9, 1.0, 1e6])
 def test_faint_and_bright_light_give_the_same_picture(gpu, power):
-    """Half floats end at 65504 and fade out below 1e-7: the maps are in a unit near the scene's irradiance."""
+    """Half floats range from 1e-7 to 65504: the maps are in a unit near the scene's irradiance."""
     pictures = []
     for level in (1.0, power):
         light = DirectionalLight((-1, -0.5, 0.2), (level, level, level))

@@ -1,4 +1,4 @@
-"""Translucent shadow maps against closed forms: slabs lit from behind, balls that let nothing through."""
+"""Translucent shadow maps against closed forms: slabs lit from behind, balls too thick for light to pass."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ MAP = {"map_size": 256}
 
 
 def pixels(height: float = FRONT.height) -> Any:
-    """x and y in mm of the pixels of an orthographic view."""
+    """Return x and y in mm of the pixels of an orthographic view."""
     t = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * height
     return np.meshgrid(t, -t)
 
 
 def through(d: Any) -> Any:
-    """What a plane under uniform light sends to points at distance d from it, of its irradiance."""
+    """Return M at distance d from a plane under uniform light, divided by its irradiance."""
     return np.exp(-np.square(d)[..., None, None] / (2 * VARIANCES[:, None])) * WEIGHTS
 
 
@@ -53,7 +53,7 @@ def frame(gpu: Any, scene: Scene, **knobs: Any) -> Image:
 
 
 def M_back(gpu: Any, *lights: Any, thickness: float = 2.0, extra: tuple = (), **changes: Any) -> Any:
-    """M_back of a slab seen from +z."""
+    """Return M_back of a slab seen from +z."""
     plate = slab((50.0, 50.0, thickness), 1000)
     scene = lit(*lights, mesh=plate, material=WAX, camera=FRONT, extra=extra)
     return frame(gpu, replace(scene, **changes)).aovs["M_back"]
@@ -62,7 +62,7 @@ def M_back(gpu: Any, *lights: Any, thickness: float = 2.0, extra: tuple = (), **
 @pytest.mark.parametrize("thickness", [0.5, 2.0, 5.0])
 @pytest.mark.parametrize("angle", [0, 60])
 def test_parallel_light_through_a_slab(gpu, thickness, angle):
-    """However the light slants, it is the slab's thickness that counts, not the way along the ray."""
+    """The thickness of the slab counts at all angles of the light, not the distance along the ray."""
     a = np.radians(angle)
     got = M_back(gpu, DirectionalLight((np.sin(a), 0, np.cos(a)), (1, 2, 3)), thickness=thickness)
     expected = np.cos(a) * np.array([1, 2, 3]) * through(np.float64(thickness)).sum(axis=0)
@@ -101,7 +101,7 @@ def test_a_point_light_behind_a_slab(gpu, z, views):
     np.testing.assert_allclose(image.aovs["M_back"], expected, rtol=0.02)
 
 
-def test_light_enters_where_it_meets_the_object(gpu, monkeypatch):
+def test_light_enters_where_it_hits_the_object(gpu, monkeypatch):
     """The shadow of something behind the slab ends where slanting light brings its edge, blurred as on the back: even
     where a map has a texel for half a millimetre."""
     monkeypatch.setattr(translucent_shadow_maps, "SIDE", {1: 128})
@@ -117,7 +117,7 @@ def test_light_enters_where_it_meets_the_object(gpu, monkeypatch):
     np.testing.assert_allclose(got, expected, atol=0.02 * expected.max())
 
 
-def test_a_small_area_light_is_as_a_point(gpu):
+def test_a_small_area_light_equals_a_point_light(gpu):
     distance, side, radius = 300.0, 10.0, 6.0
     metres = (distance - 1.0) / 1000.0
     expected = through(np.float64(2.0)).sum(axis=0)
@@ -153,15 +153,15 @@ def test_a_single_light_shares_the_surfaces_maps_and_brings_the_sky(gpu):
 
 
 @pytest.mark.parametrize("lights", [(SKY,), (PointLight((0, 0, -50), (0, 0, 0)), SKY), ()], ids=["sky", "dark", "none"])
-def test_where_no_light_is_there_are_no_passes(gpu, lights):
+def test_without_light_there_are_no_passes(gpu, lights):
     image = frame(gpu, lit(*lights, mesh=slab(vertices=100), material=WAX, camera=FRONT))
     assert not [item for item in image.graph.passes if item.module.name.startswith("translucent_shadow_maps/")]
     assert sum(item.module.name == "texture_space/dilate" for item in image.graph.passes) == 1
     assert not image.aovs["M_back"].any()
 
 
-def test_what_is_lit_does_not_lie_behind_itself(gpu, monkeypatch):
-    """It is in M_front. Where a map's texels are coarse and the surface bends, there would be acne."""
+def test_lit_points_do_not_lie_behind_themselves(gpu, monkeypatch):
+    """Light at lit points belongs to M_front. With coarse maps on a bent surface there would be acne."""
     assert M_back(gpu, AHEAD).max() < 1e-6
     monkeypatch.setattr(translucent_shadow_maps, "SIDE", {1: 128})
     camera = OrthographicCamera((0, 30, 100), (0, 30, 0), height=70)
@@ -170,8 +170,8 @@ def test_what_is_lit_does_not_lie_behind_itself(gpu, monkeypatch):
     assert np.quantile(aovs["M_back"][aovs["M_front"] > 0], 0.97) < 0.005 * aovs["M_front"].max()
 
 
-def test_light_reaches_the_edge_of_what_it_meets(gpu, monkeypatch):
-    """Rays of coarse texels that pass beside the object do not darken it."""
+def test_light_reaches_the_edge_of_the_object(gpu, monkeypatch):
+    """Rays that miss the object do not darken it, even with coarse maps."""
     monkeypatch.setattr(translucent_shadow_maps, "SIDE", {1: 4})
     fine = replace(MATTE, gaussians=SumOfGaussians(VARIANCES / 100, WEIGHTS))
     light = DirectionalLight((0, 0, 1), (1, 1, 1))
@@ -182,7 +182,7 @@ def test_light_reaches_the_edge_of_what_it_meets(gpu, monkeypatch):
     np.testing.assert_allclose(got[inside], expected[inside], rtol=0.02)
 
 
-def test_a_ball_much_wider_than_the_gaussians_lets_nothing_through(gpu):
+def test_a_ball_much_wider_than_the_gaussians_transmits_no_light(gpu):
     """Nor is there a halo where its light ends: M_front has what crosses there. A ball shows what is corrected that is
     not level, what is not faded, and where charts end."""
     camera = OrthographicCamera((0, 0, 100), (0, 0, 0), height=84)
@@ -191,7 +191,7 @@ def test_a_ball_much_wider_than_the_gaussians_lets_nothing_through(gpu):
         assert image.aovs["M_back"].max() < 0.03 * WAX.profile.total.max()
 
 
-def test_what_enters_round_an_edge_fades_in_by_the_way_over_the_surface(gpu):
+def test_light_that_enters_around_an_edge_fades_in_with_the_distance_along_the_surface(gpu):
     """A block lit from above and behind, seen from the front. Between faces at a right angle the ray is not corrected,
     and the way over the surface is taken to be twice as long: it counts in full from four sigmas on."""
     wax = replace(MATTE, gaussians=SumOfGaussians(np.ones(1), np.full((1, 3), 0.9)))
@@ -209,7 +209,7 @@ def test_what_enters_round_an_edge_fades_in_by_the_way_over_the_surface(gpu):
     np.testing.assert_allclose(got[seen], expected[seen], rtol=0.1, atol=0.01)
 
 
-def test_other_objects_keep_the_light_off_but_do_not_shine(gpu):
+def test_other_objects_block_the_light_and_do_not_shine(gpu):
     shade = Object(Mesh(plane(side=60.0).positions[:, [0, 2, 1]] + np.float32([0, 0, -6]), plane().faces), WAX)
     assert M_back(gpu, BEHIND, extra=(shade,)).max() < 1e-4
     beside = Object(slab((50.0, 50.0, 2.0), 1000), WAX, translate=(0, 0, 8))  # seen, in the first one's shade
@@ -244,7 +244,7 @@ def test_same_scene_same_bits(gpu):
     assert other.pixels.tobytes() == first.pixels.tobytes()
 
 
-def test_it_goes_with_texture_space_alone():
+def test_translucent_shadow_maps_need_texture_space():
     assert type(make_method("texture+tsm")) is type(make_method("deon07"))
     with pytest.raises(InputError, match="translucency tsm goes with surface texture, not with screen"):
         make_method("screen+tsm")

@@ -42,20 +42,20 @@ def plate(thickness: float, side: float = 40.0) -> Mesh:
 
 
 def through(gpu, scene, method="none+transmittance", size=32):
-    """M_back."""
+    """Return M_back."""
     image = Renderer(scene, make_method(method), (size, size), gpu).frame(aovs=["M_back"], timed=False)
     return image.aovs["M_back"]
 
 
 def floor_points(size=32, height=20.0):
-    """Where the pixels of ABOVE see y = 0."""
+    """Return the points of y = 0 at the pixels of ABOVE."""
     t = ((np.arange(size) + 0.5) / size - 0.5) * height
     x, z = np.meshgrid(t, t)
     return np.stack([x, np.zeros_like(x), z], axis=-1)
 
 
 def thickness_by(M, E):
-    """How thick WIDE is where it lets through M of E."""
+    """Return the thickness of WIDE at which it transmits M of E."""
     return np.sqrt(-40.0 * np.log(M / (WEIGHTS * E)))
 
 
@@ -97,7 +97,7 @@ def test_a_plate_lit_straight_from_behind(gpu, thickness):
 @pytest.mark.parametrize("far", [0.0, 300.0])
 @pytest.mark.parametrize("angle", [20, 50, 70])
 def test_a_plate_lit_aslant(gpu, angle, far):
-    """However large shadow texels are: something far away makes them so."""
+    """The result does not depend on the size of shadow texels, which a distant object increases."""
     a = np.radians(angle)
     light = DirectionalLight((np.sin(a), np.cos(a), 0), (1, 1, 1))
     beside = (Object(plane(side=4.0, y=-3.0), MATTE, translate=(0, 0, far)),) if far else ()
@@ -108,7 +108,7 @@ def test_a_plate_lit_aslant(gpu, angle, far):
 
 
 def test_a_wedge_lit_straight_from_behind(gpu):
-    """Nothing is moved aside, not by a tenth of a texel, and at the edge of the wedge half of the rays miss it."""
+    """Thickness is not shifted, not even by a tenth of a texel; at the edge of the wedge half of the rays miss it."""
     flat = plate(3.0, side=14.0)
     x, y, z = flat.positions.T
     wedge = Mesh(np.stack([x, np.where(y < 0, y + 0.3 * x, y), z], axis=1), flat.faces)
@@ -124,8 +124,8 @@ def test_a_wedge_lit_straight_from_behind(gpu):
 
 
 @pytest.mark.parametrize("angle", [6, 10, 16, 30, 60])
-def test_the_lit_side_gets_next_to_nothing(gpu, angle):
-    """Though E ends only 17.5 degrees above the surface."""
+def test_the_lit_side_receives_hardly_any_light(gpu, angle):
+    """This holds although E is 0 only from 17.5 degrees above the surface."""
     a = np.radians(angle)
     light = DirectionalLight((-np.cos(a), -np.sin(a), 0), (1, 1, 1))
     assert through(gpu, lit(light, mesh=plate(3.0), material=SKIN, camera=ABOVE)).max() < 5e-3
@@ -150,7 +150,7 @@ def test_point_lights(gpu, depth):
     )
 
 
-def test_the_face_of_a_cube_is_that_of_the_ray_that_is_taken_below(gpu):
+def test_the_face_of_a_cube_is_that_of_the_moved_point(gpu):
     """Through a wedge: between 5 and 8 mm from above the light, another face would see x_o."""
     flat, light = plate(6.0), PointLight((0, -8, 0), intensity=(1, 1, 1))
     x, y, z = flat.positions.T
@@ -171,7 +171,7 @@ def test_the_face_of_a_cube_is_that_of_the_ray_that_is_taken_below(gpu):
     assert crossed.sum() > 100
 
 
-def test_rays_are_taken_below_by_shadow_texels_that_grow_with_distance(gpu):
+def test_points_are_moved_by_shadow_texels_that_grow_with_distance(gpu):
     """Lit aslant from in front, by one face of a cube: 60 mm away a texel is 0.06 mm wide."""
     beyond = Object(plane(side=40.0, y=-30.0), MATTE, translate=(100, 0, 0))
     light = PointLight((60, 15, 0), intensity=(1, 1, 1))
@@ -205,7 +205,7 @@ def test_area_lights(gpu):
 
 
 def test_a_ball_lit_from_aside(gpu):
-    """Chords of a ball, below its surface; up to where the light grazes it there is neither grain nor a step."""
+    """Thickness is the chord of a ball. Up to where the light grazes it there is neither noise nor a step."""
     light = DirectionalLight((-1, 0, 0), (1, 1, 1))
     M = through(gpu, lit(light, mesh=sphere(8.0, 40_000), material=WIDE, camera=ABOVE), size=200)[100, :, 0]
     x = ((np.arange(200) + 0.5) / 200 - 0.5) * 20
@@ -217,7 +217,7 @@ def test_a_ball_lit_from_aside(gpu):
     assert np.abs(np.diff(M[on], n=2)).max() < 0.002
 
 
-def test_a_ball_of_skin_has_no_grain(gpu):
+def test_a_ball_of_skin_has_no_noise(gpu):
     """Where the light grazes it, a shadow texel's depth is more than the narrowest Gaussian."""
     scene = lit(DirectionalLight((-1, 0, 0), (1, 1, 1)), mesh=sphere(8.0, 40_000), material=SKIN, camera=ABOVE)
     M = through(gpu, scene, size=200)[60:140, 30:118]
@@ -225,8 +225,8 @@ def test_a_ball_of_skin_has_no_grain(gpu):
     assert M.max() > 0.01
 
 
-def test_the_surface_lets_in_what_it_does_from_outside(gpu):
-    """rho_dt at the angle to which the back is taken to be lit, as lambert has it in front."""
+def test_the_back_transmits_as_much_as_the_front(gpu):
+    """rho_dt is that of the angle of incidence assumed at the back, as it is for lambert at the front."""
     a, grazing = np.radians(80), np.arcsin(0.3 + np.cos(np.radians(80)))
     behind = DirectionalLight((np.sin(a), np.cos(a), 0), (1, 1, 1))
     before = DirectionalLight((np.cos(grazing), -np.sin(grazing), 0), (1, 1, 1))
@@ -237,7 +237,7 @@ def test_the_surface_lets_in_what_it_does_from_outside(gpu):
     np.testing.assert_allclose(M, lambert.aovs["M_front"], rtol=0.005)
 
 
-def test_the_sky_alone_costs_nothing(gpu):
+def test_the_sky_alone_has_no_passes(gpu):
     scene = lit(EnvironmentLight((1, 1, 1)), mesh=plate(1.0), material=WIDE, camera=ABOVE)
     for name in ("none+transmittance", "jimenez15"):
         image = Renderer(scene, make_method(name), (16, 16), gpu).frame(aovs=["M_back"], timed=False)
@@ -247,13 +247,13 @@ def test_the_sky_alone_costs_nothing(gpu):
         assert len(blurs) == (2 if name == "jimenez15" else 0)  # none for a sum, none for M_back
 
 
-def test_what_is_far_in_front_keeps_the_light_off(gpu):
+def test_a_distant_object_in_front_blocks_the_light(gpu):
     sheet = Object(plane(side=40.0, y=-40.0), MATTE)
     assert through(gpu, lit(UP, mesh=plate(1.0), material=SKIN, camera=ABOVE, extra=(sheet,))).max() < 1e-8
 
 
-def test_what_nearly_touches_counts_as_a_part(gpu):
-    """Both plates are seen: each by its own profile."""
+def test_an_object_that_nearly_touches_counts_as_a_part(gpu):
+    """Both plates are visible, each with its own profile."""
     lower = Object(plate(2.0, side=60.0), WIDE, translate=(0, -2.5, 0))
     wide = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=56)
     M = through(gpu, lit(UP, mesh=plate(2.0), material=SKIN, camera=wide, extra=(lower,)), size=56)
@@ -272,7 +272,7 @@ def test_the_base_colour_is_that_of_the_pixel(gpu, surface, share):
     np.testing.assert_allclose(M, np.broadcast_to(expected, M.shape), rtol=0.01)
 
 
-def test_screen_space_blurs_it(gpu):
+def test_screen_space_blurs_the_transmitted_light(gpu):
     """Where a step of the plate's thickness throws an edge, which alone is sharp; nothing leaves the plate."""
     half = Mesh(plane(side=30.0, y=-14.0).positions - np.float32([15, 0, 0]), plane().faces)
     scene = lit(UP, mesh=plate(1.0, side=14.0), material=SKIN, camera=ABOVE, extra=(Object(half, MATTE),))
@@ -289,8 +289,8 @@ def test_screen_space_blurs_it(gpu):
 
 
 @pytest.mark.parametrize("kernel", ["line-spread", "svd"])
-def test_one_blur_is_that_of_both(gpu, kernel):
-    """Of an image alone; M_front and M_back are blurred apart for who asks for them."""
+def test_one_blur_equals_the_sum_of_two(gpu, kernel):
+    """The image has one blur; M_front and M_back are blurred separately where they are asked for."""
     half = Object(Mesh(plane(side=30.0, y=-14.0).positions - np.float32([15, 0, 0]), plane().faces), MATTE)
     other = Object(plate(1.0, side=6.0), WIDE, translate=(0, 3, 0))
     lights = (UP, DirectionalLight((0.5, -1, 0), (3, 2, 1)))
@@ -310,7 +310,7 @@ def test_one_blur_is_that_of_both(gpu, kernel):
     assert min(front.max(), back.max()) > 0.1 and found.M == (found.together,)
 
 
-def test_channels_that_reflect_nothing(gpu):
+def test_channels_that_do_not_reflect(gpu):
     for weights in ([[0.5, 0.0, 0.2]], [[0.0, 0.0, 0.0]]):
         material = replace(MATTE, gaussians=SumOfGaussians(np.array([2.0]), np.array(weights)))
         M = through(gpu, lit(UP, mesh=plate(0.5), material=material, camera=ABOVE), "jimenez15")

@@ -1,4 +1,4 @@
-"""Drawing only what is seen: the picture of the whole surface's diffusion, for less."""
+"""Diffusion over the visible texels only gives the same picture as over all texels."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def picture(gpu, scene, method, size=(96, 64)):
 
 
 def drawn(image, module):
-    """The sizes of what the passes of a module drew."""
+    """Return the sizes of the targets of a module's passes."""
     return [next(iter(item.writes.values())).size[0] for item in image.graph.ran if item.module.name == module]
 
 
 def lit_texels(gpu, scene, size, **limits):
-    """bool (size, size): where the irradiance map of the first object has a value; and its render mesh."""
+    """Return where the irradiance map of the first object has a value, bool (size, size), and its render mesh."""
     stage = Stage(gpu, scene)
     stage.bodies[0].unwrap()
     graph = Graph(gpu)
@@ -102,8 +102,8 @@ def test_a_face_is_dark_as_a_whole(gpu):
 
 @pytest.mark.parametrize("switch", ["culled", "clipped"])
 @pytest.mark.parametrize("shape", ["ball", "box", "ear"])
-def test_what_is_left_out_is_not_missed(gpu, shape, switch):
-    """Partly beside the image, lit from behind: at most one step of 255 from the diffusion of all of the surface."""
+def test_texels_that_are_left_out_do_not_change_the_picture(gpu, shape, switch):
+    """An object partly outside of the image, lit from behind, differs by at most one step of 255."""
     mesh = {"ball": sphere(40.0, 3000), "box": slab(size=(30, 30, 12)), "ear": ear(1000)}[shape]
     camera = PerspectiveCamera((0, 60, 120), (25, 12, 0), fov=30)
     behind = DirectionalLight((-0.3, 0.1, 0.9), (2, 2, 2))
@@ -115,7 +115,7 @@ def test_what_is_left_out_is_not_missed(gpu, shape, switch):
     assert len(np.unique(some.display)) > 50
 
 
-def test_on_what_bends_little_the_limit_is_105_degrees(gpu):
+def test_on_surfaces_with_little_curvature_the_limit_is_105_degrees(gpu):
     """On a ball the angle that light spreads over is that of a chord of three standard deviations."""
     for radius in (40.0, 20.0, 10.0):
         angle = max(105.0, 90 + math.degrees(2 * math.asin(3 * math.sqrt(7.41) / (2 * radius))))
@@ -125,7 +125,7 @@ def test_on_what_bends_little_the_limit_is_105_degrees(gpu):
         np.testing.assert_allclose(np.degrees(np.arccos(cosines)), angle, atol=0.01 if angle == 105 else 2)
 
 
-def test_light_comes_from_beside_the_image(gpu):
+def test_light_spreads_from_outside_of_the_image(gpu):
     """The edge of a shadow is 1 mm to the left of the image, and light spreads over several."""
     camera = OrthographicCamera((4, 60, 0), (4, 0, 0), up=(0, 0, -1), height=4)
     shade = Object(Mesh(plane(side=60.0).positions + np.float32([-30, 10, 0]), plane().faces), MATTE)
@@ -150,7 +150,7 @@ def test_texels_far_from_the_image_are_dark(gpu):
 
 
 @pytest.mark.parametrize("place", [(300, 0, 0), (-300, 0, 0), (0, 300, 0), (0, -300, 0), (0, 0, 500)])
-def test_an_object_beside_the_image_or_behind_the_camera_has_no_passes(gpu, place):
+def test_an_object_outside_of_the_image_or_behind_the_camera_has_no_passes(gpu, place):
     scene = lit(SIDE, mesh=sphere(20.0, 500), material=SKIN, camera=FRONT)
     away = replace(scene.objects[0], translate=place)
     method = VisibleTextureSpace(map_size=128)
@@ -160,7 +160,7 @@ def test_an_object_beside_the_image_or_behind_the_camera_has_no_passes(gpu, plac
     assert not drawn(nothing, "texture_space/blur") and not nothing.pixels.any()
 
 
-def test_switched_off_it_is_deon07_to_the_bit(gpu):
+def test_with_all_switches_off_it_equals_deon07_bit_by_bit(gpu):
     scene = lit(SIDE, mesh=ear(1000), material=SKIN, camera=PerspectiveCamera((0, 0, 250), (0, 30, 0), fov=30))
     whole, same = (
         picture(gpu, scene, m) for m in (TextureSpace(map_size=128), VisibleTextureSpace(map_size=128, **OFF))
@@ -169,7 +169,7 @@ def test_switched_off_it_is_deon07_to_the_bit(gpu):
 
 
 @pytest.mark.parametrize("distance", [0.9, 1.01, 1.4, 2.0, 3.0, 7.9, 100.0])
-def test_maps_follow_the_distance(gpu, distance):
+def test_the_size_of_maps_follows_from_the_distance(gpu, distance):
     """Eq. 3 and 4, with d_ref where the map has TEXELS_PER_PIXEL, for a plane that faces the camera."""
     T_max, fov, height = 512, 30.0, 64
     texels_per_mm = 0.98 * T_max / 40
@@ -218,8 +218,8 @@ def test_no_frame_of_a_zoom_waits_for_a_bake_and_memory_stays(gpu, monkeypatch):
     assert len(gpu._views) == known
 
 
-def test_smaller_maps_are_no_further_from_what_pixels_see(gpu):
-    """Against means over the pixels: the full map has so many texels to a pixel that a pixel sees one by chance."""
+def test_smaller_maps_are_no_less_accurate(gpu):
+    """Compared with means over the pixels: with many texels per pixel, the full map aliases."""
     size, by = (48, 48), 4
     camera = PerspectiveCamera((60, 30, 550), (0, 31, 0), fov=30)
     scene = lit(SIDE, mesh=ear(2000), material=SKIN, camera=camera)
@@ -275,7 +275,7 @@ def test_pixels_do_not_count_texels_without_a_value(gpu):
     np.testing.assert_allclose(graph.read(M_front)[..., :3].reshape(-1, 3), np.tile(expected, (48 * 48, 1)), rtol=2e-3)
 
 
-def test_where_a_back_may_be_seen_nothing_is_culled(gpu):
+def test_nothing_is_culled_where_a_back_may_be_visible(gpu):
     """A sheet from behind, and a ball from inside."""
     below = PerspectiveCamera((5, -60, 5), (0, 0, 0), up=(0, 0, -1), fov=30)
     inside = PerspectiveCamera((2, 0, 3), (20, 0, 0), fov=60)

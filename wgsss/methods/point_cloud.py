@@ -202,12 +202,12 @@ def kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     (2 blunt)) instead of R_d(r), which is flat at r = 0."""
 
     def make() -> Arrays:
-        return vars(_kernel(profile, blunt, size))
+        return _kernel(profile, blunt, size)
 
     return Kernel(**cached("point-cloud-kernel", [profile, blunt, size], make))
 
 
-def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
+def _kernel(profile: Profile, blunt: float, size: float) -> Arrays:
     far = max(min(size, float(profile.range(_BEYOND).max())), 2.0 * blunt)
     first, last = leading_bits(np.square([_CLOSEST * blunt, far])).tolist()
     r = np.sqrt(interval_middles(first, last + 1))
@@ -220,7 +220,7 @@ def _kernel(profile: Profile, blunt: float, size: float) -> Kernel:
     flattened = (0.5 * blunt * w * 2.0 * np.pi * inside) @ blunted(inside)
     R = blunted(r)
     R[-1] = 0.0
-    return Kernel(r, R, profile.total * profile.enclosed(blunt) - flattened)
+    return {"r": r, "R": R, "near": profile.total * profile.enclosed(blunt) - flattened}
 
 
 @dataclass(frozen=True, eq=False)
