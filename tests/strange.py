@@ -149,7 +149,7 @@ def meshes() -> dict[str, bytes]:
 def images() -> dict[str, bytes]:
     """Return two skies and a texture as files."""
     rgbe = np.full((8, 16, 4), 128, np.uint8)
-    rgbe[..., :3] = np.arange(128).reshape(8, 16, 1)
+    rgbe[..., :3] = np.arange(3, 131).reshape(8, 16, 1)  # 1 1 1 would be a run
     stream, exr = io.BytesIO(), io.BytesIO()
     Image.fromarray(rgbe[..., :3]).save(stream, format="png")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

@@ -1,4 +1,4 @@
-"""`wgsss bench`."""
+"""`wgsss bench`: text, JSON, charts and interrupted runs."""
 
 from __future__ import annotations
 
@@ -29,54 +29,54 @@ def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[
 
 @pytest.fixture
 def done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[RunSpec]:
-    """Runs that cost nothing, in an empty folder."""
+    """Replace measurements by fast stand-ins, in an empty folder. Return the list of runs."""
     specs: list[RunSpec] = []
 
     def fake(scene: Scene, spec: RunSpec) -> dict[str, Any]:
         specs.append(spec)
         ms = 10.0 * len(specs)
         costs = {"bake_ms": 1.0, "bake_cached": False, "frame_ms": ms, "frame_ms_quartiles": [ms, ms], "frames": 9}
-        where = {"adapter": "a", "clock": "sundial", "date": "2026-01-02T03:04:05+00:00", "passes": {}, "bytes": 7}
+        context = {"adapter": "a", "clock": "sundial", "date": "2026-01-02T03:04:05+00:00", "passes": {}, "bytes": 7}
         error = {"rel_rmse": 1.0 / ms, "psnr": None, "flip": None, "bias": 1.0}
-        return {**spec.json(), **costs, **where, "error": error, "floor": 0.01}
+        return {**spec.json(), **costs, **context, "error": error, "floor": 0.01}
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(bench_run, "execute", fake)
     monkeypatch.setattr(provenance, "adapter", lambda: "a")
-    monkeypatch.setitem(REFERENCES, "integral", METHODS["lambert"])  # a name is all that is asked of it here
+    monkeypatch.setitem(REFERENCES, "integral", METHODS["lambert"])  # only its name is used
     return specs
 
 
-def test_text_has_a_row_per_run_and_the_files(done: list[RunSpec], tmp_path: Path, capsys):
+def test_text_has_a_row_per_run_and_names_the_files(done: list[RunSpec], tmp_path: Path, capsys):
     out, err = run(capsys, "slab", "sphere", "--methods", "lambert,deon07")
     table, files = out.split("\n\n")
     rows = [line.split()[:2] for line in table.splitlines()]
     assert rows[1:] == [[scene, m] for scene in ("slab", "sphere") for m in ("lambert", *["deon07"] * 4)]
     assert "map_size=2048" in table and "10.0" in table and "cold" in table
     assert sorted(path.name for path in (tmp_path / "bench").iterdir()) == FILES
-    assert files.split() == [f"bench/chart.{ending}" for ending in ("svg", "png", "html")]
-    assert len(err.splitlines()) == len(done) == 10  # a line per run, as it ends
+    assert files.split() == [f"bench/chart.{extension}" for extension in ("svg", "png", "html")]
+    assert len(err.splitlines()) == len(done) == 10  # a line per finished run
     assert err.startswith("slab by lambert: 10.00 ms, error 10 %\nslab by deon07 map_size=256 gaussians=6: 20.00 ms")
 
 
 def test_json_has_the_runs(done: list[RunSpec], capsys):
     result = json.loads(run(capsys, "slab", "--methods", "lambert", "--size", "32x24", "-o", "here", "--json")[0])
     assert result["files"] == ["here/chart.svg", "here/chart.png", "here/chart.html"]
-    (found,) = result["runs"]
+    (entry,) = result["runs"]
     promised = {"scene", "method", "knobs", "size", "adapter", "bake_ms", "frame_ms", "passes", "bytes", "error"}
-    assert promised <= found.keys() and found["error"].keys() == {"rel_rmse", "psnr", "flip", "bias"}
-    assert (found["scene"], found["size"], found["reference"]) == ("slab", [32, 24], "integral")
+    assert promised <= entry.keys() and entry["error"].keys() == {"rel_rmse", "psnr", "flip", "bias"}
+    assert (entry["scene"], entry["size"], entry["reference"]) == ("slab", [32, 24], "integral")
 
 
-def test_the_chart_has_all_runs_of_the_folder_and_without_a_scene_it_is_all_there_is(done: list[RunSpec], capsys):
+def test_the_chart_has_all_runs_of_the_folder(done: list[RunSpec], capsys):
     run(capsys, "slab", "--methods", "lambert")
     first = Path("bench/chart.svg").read_text()
     run(capsys, "sphere", "--methods", "lambert")
-    both = Path("bench/chart.svg").read_text()
-    assert first != both
+    second = Path("bench/chart.svg").read_text()
+    assert first != second
     Path("bench/chart.svg").unlink()
     out, err = run(capsys)
-    assert Path("bench/chart.svg").read_text() == both and err == "" and len(done) == 2
+    assert Path("bench/chart.svg").read_text() == second and err == "" and len(done) == 2
     assert [line.split()[0] for line in out.splitlines()[1:3]] == ["slab", "sphere"]
 
 
@@ -85,7 +85,7 @@ def test_a_scene_named_twice_is_measured_once(done: list[RunSpec], capsys):
     assert len(done) == 1
 
 
-def test_ctrl_c_keeps_what_is_done(done: list[RunSpec], monkeypatch: pytest.MonkeyPatch, capsys):
+def test_ctrl_c_keeps_finished_runs(done: list[RunSpec], monkeypatch: pytest.MonkeyPatch, capsys):
     fake = bench_run.execute
 
     def interrupted(scene: Scene, spec: RunSpec) -> Any:
@@ -124,7 +124,7 @@ def test_bad_input_is_one_line(argv, says, done: list[RunSpec], monkeypatch: pyt
     assert not done
 
 
-def test_choices_are_those_of_every_scene(done: list[RunSpec], tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
+def test_options_apply_to_every_scene(done: list[RunSpec], tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
     seen: list[Scene] = []
     fake = bench_run.execute
     monkeypatch.setattr(bench_run, "execute", lambda scene, spec: (seen.append(scene), fake(scene, spec))[1])
@@ -137,6 +137,6 @@ def test_choices_are_those_of_every_scene(done: list[RunSpec], tmp_path: Path, c
     assert all(len(scene.objects[0].mesh.positions) < 700 for scene in seen)
 
 
-def test_the_table_is_of_the_scene_as_it_is(capsys):
+def test_the_table_accepts_no_scene_options(capsys):
     _, err = run(capsys, "crowd", "--table", "speedup", "--material", "marble", code=2)
     assert "as it is" in err and err.count("\n") == 1

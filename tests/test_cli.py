@@ -1,4 +1,4 @@
-"""The command line: what it prints and writes, and that bad input is one line, exit code 2 and no file."""
+"""The command line: its output and files, and for bad input one line, exit code 2 and no file."""
 
 from __future__ import annotations
 
@@ -35,44 +35,44 @@ HEAVY = ("numpy", "wgpu", "scipy", "trimesh", "xatlas", "PIL", "OpenEXR", "tqdm"
 
 
 @dataclass
-class Said:
+class Output:
+    """Exit code and output of a command."""
+
     code: int
     out: str
     err: str
 
 
 @pytest.fixture
-def wgsss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
-    """Runs a command in an empty folder."""
+def wgsss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Output]:
+    """Return a function that runs a command in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*argv: str) -> Said:
+    def run(*argv: str) -> Output:
         code = main(argv)
-        return Said(code, *capsys.readouterr())
+        return Output(code, *capsys.readouterr())
 
     return run
 
 
-Run = Callable[..., Said]
+Run = Callable[..., Output]
 
 
 def process(*argv: str, cwd: Path = ROOT, **environment: str) -> subprocess.Popen[str]:
-    """The command as a process of its own, from this checkout whatever the folder."""
+    """Start the command of this checkout as a process in a folder."""
     command = [sys.executable, "-m", "wgsss", *argv]
     env = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
     return subprocess.Popen(command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-# what there is
+# lists and help
 
 
 @pytest.mark.parametrize(("command", "names"), [("scenes", SCENES), ("methods", METHODS), ("materials", MATERIALS)])
-def test_lists_have_every_name_with_something_to_say_about_it(
-    wgsss: Run, command: str, names: dict[str, object]
-) -> None:
+def test_lists_describe_every_name(wgsss: Run, command: str, names: dict[str, object]) -> None:
     text = wgsss(command)
-    said = [line for line in text.out.split("\n\n")[0].splitlines() if not line.startswith(" ")]
-    lines = [line.split(maxsplit=1) for line in said if not line.endswith(" (a reference)")]
+    entries = [line for line in text.out.split("\n\n")[0].splitlines() if not line.startswith(" ")]
+    lines = [line.split(maxsplit=1) for line in entries if not line.endswith(" (a reference)")]
     assert [line[0] for line in lines] == list(names)
     assert all(len(line) == 2 for line in lines)
     listed = json.loads(wgsss(command, "--json").out)[command]
@@ -93,7 +93,7 @@ def test_a_method_that_is_a_pair_is_listed_with_its_parts(wgsss: Run) -> None:
     assert (pairs["deon07"], pairs["barre11"], pairs["lambert"]) == ("texture+tsm", "none+thickness", None)
 
 
-def test_surfaces_and_translucencies_are_listed_as_what_pairs_are_made_of(wgsss: Run) -> None:
+def test_methods_list_surfaces_and_translucencies_for_pairs(wgsss: Run) -> None:
     pairs = json.loads(wgsss("methods", "--json").out)["pairs"]
     assert pairs == {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
     assert f"--surface one of {', '.join(SURFACES)}" in wgsss("methods").out
@@ -107,13 +107,13 @@ def test_methods_list_knobs_with_unit_default_and_range(wgsss: Run) -> None:
 
 
 def test_info_names_the_adapter_and_the_versions(wgsss: Run) -> None:
-    found = json.loads(wgsss("info", "--json").out)
-    assert found["chosen"] and found["versions"]["numpy"] == np.__version__
-    assert found["cache"]["folder"] == os.environ["WGSSS_CACHE"]
-    assert found["chosen"] in wgsss("info").out
+    info = json.loads(wgsss("info", "--json").out)
+    assert info["chosen"] and info["versions"]["numpy"] == np.__version__
+    assert info["cache"]["folder"] == os.environ["WGSSS_CACHE"]
+    assert info["chosen"] in wgsss("info").out
 
 
-def test_help_needs_nothing_heavy_and_names_every_command_and_the_default_method() -> None:
+def test_help_loads_no_heavy_packages_and_names_all_commands() -> None:
     script = f"""
 import sys
 from wgsss.cli import catalogue, main
@@ -131,7 +131,7 @@ print([name for name in {HEAVY} if name in sys.modules])
         assert word in done.stdout
 
 
-def test_import_needs_nothing_heavy_and_offers_what_it_lists() -> None:
+def test_import_loads_no_heavy_packages_and_has_all_public_names() -> None:
     script = f"""
 import sys, wgsss
 print([name for name in {HEAVY} if name in sys.modules])
@@ -148,9 +148,9 @@ assert callable(wgsss.render) and wgsss.Renderer is Renderer
 
 
 def test_render_writes_the_picture_named_after_the_scene(wgsss: Run, tmp_path: Path) -> None:
-    said = wgsss("render", *SMALL)
-    assert (said.code, said.err) == (0, "")
-    assert said.out.startswith("sphere.png: ")
+    output = wgsss("render", *SMALL)
+    assert (output.code, output.err) == (0, "")
+    assert output.out.startswith("sphere.png: ")
     assert [path.name for path in tmp_path.iterdir()] == ["sphere.png"]
     with Picture.open(tmp_path / "sphere.png") as picture:
         pixels = np.asarray(picture)
@@ -171,16 +171,17 @@ def test_linear_files_hold_all_extra_outputs(wgsss: Run, tmp_path: Path) -> None
     assert header["Software"].startswith("wgsss ") and header["wgsss.adapter"]
 
 
-def test_json_says_what_was_made_and_how(wgsss: Run) -> None:
-    said = wgsss("render", *SMALL, "-o", "a.png", "--json")
-    made = json.loads(said.out)
-    assert (made["files"], made["scene"], made["method"], made["size"]) == (["a.png"], "sphere", "lambert", [24, 16])
-    assert said.err == ""
+def test_json_describes_the_picture_and_its_options(wgsss: Run) -> None:
+    output = wgsss("render", *SMALL, "-o", "a.png", "--json")
+    result = json.loads(output.out)
+    assert (result["files"], result["scene"], result["method"]) == (["a.png"], "sphere", "lambert")
+    assert result["size"] == [24, 16]
+    assert output.err == ""
 
 
 def test_graph_lists_the_passes_with_times(wgsss: Run, tmp_path: Path) -> None:
-    said = wgsss("render", *SMALL, "--graph", "--graph-out", "a.dot")
-    assert "frame/gbuffer" in said.out and "passes ran" in said.out and "MiB" in said.out
+    output = wgsss("render", *SMALL, "--graph", "--graph-out", "a.dot")
+    assert "frame/gbuffer" in output.out and "passes ran" in output.out and "MiB" in output.out
     assert (tmp_path / "a.dot").read_text().startswith("digraph")
     graph = json.loads(wgsss("render", *SMALL, "--graph", "--json").out)["graph"]
     assert all(entry["culled"] or entry["ms"] > 0 for entry in graph["passes"])
@@ -189,8 +190,8 @@ def test_graph_lists_the_passes_with_times(wgsss: Run, tmp_path: Path) -> None:
 
 def test_frames_follow_the_motion(wgsss: Run, tmp_path: Path) -> None:
     wave = ["wave", "--vertices", "300", "--method", "lambert", "--size", "16x16"]
-    said = wgsss("render", *wave, "--frames", "2", "--fps", "1", "-o", "a.npy")
-    assert (said.code, said.err) == (0, "")
+    output = wgsss("render", *wave, "--frames", "2", "--fps", "1", "-o", "a.npy")
+    assert (output.code, output.err) == (0, "")
     assert wgsss("render", *wave, "--time", "1", "-o", "b.npy").code == 0
     first, second, alone = (np.load(f"{name}.npy") for name in ("a.0001", "a.0002", "b"))
     np.testing.assert_array_equal(second, alone)
@@ -199,7 +200,7 @@ def test_frames_follow_the_motion(wgsss: Run, tmp_path: Path) -> None:
     assert (tmp_path / "a.mp4").stat().st_size > 0
 
 
-def test_exposure_material_and_tone_map_take_the_place_of_the_scenes_own(wgsss: Run) -> None:
+def test_exposure_material_and_tone_map_replace_those_of_the_scene(wgsss: Run) -> None:
     def brightest(*choice: str) -> float:
         assert wgsss("render", *SMALL, "--tone-map", "none", "-o", "a.png", *choice).code == 0
         with Picture.open("a.png") as picture:
@@ -209,7 +210,7 @@ def test_exposure_material_and_tone_map_take_the_place_of_the_scenes_own(wgsss: 
     assert brightest("--exposure", "-1", "--material", "ketchup") != brightest("--exposure", "-1")
 
 
-def test_bake_says_what_it_made_and_makes_it_once(wgsss: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bake_lists_new_cache_entries_once(wgsss: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("WGSSS_CACHE", str(tmp_path / "cache"))
     scene = ["sphere", "--vertices", "300", "--set", "map_size=64", "--json"]
     first = json.loads(wgsss("bake", *scene).out)
@@ -299,13 +300,13 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("command", "said"), BAD, ids=[command for command, _ in BAD])
-def test_bad_input_is_one_line_and_no_file(wgsss: Run, tmp_path: Path, command: str, said: str) -> None:
+@pytest.mark.parametrize(("command", "message"), BAD, ids=[command for command, _ in BAD])
+def test_bad_input_is_one_line_and_no_file(wgsss: Run, tmp_path: Path, command: str, message: str) -> None:
     for name, content in FILES.items():
         (tmp_path / name).write_bytes(content)
     result = wgsss(*command.split())
     assert result.err.startswith("wgsss: error: ") and result.err.count("\n") == 1 and result.err.endswith("\n")
-    assert said in result.err
+    assert message in result.err
     assert (result.code, result.out) == (2, "")
     assert {path.name for path in tmp_path.iterdir()} == set(FILES)
 
@@ -317,11 +318,11 @@ def test_no_adapter_is_one_line(tmp_path: Path, command: str) -> None:
     out, err = done.communicate()
     assert err.startswith("wgsss: error: no Vulkan adapter found") and err.count("\n") == 1
     assert done.returncode == 2
-    assert ("chosen" in out) == (command == "info")  # what is known is told all the same
+    assert ("chosen" in out) == (command == "info")  # info prints the rest nevertheless
     assert not list(tmp_path.iterdir())
 
 
-def test_a_picture_that_is_not_finite_is_a_failure_and_no_file(
+def test_a_picture_that_is_not_finite_is_an_error_and_no_file(
     wgsss: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read = Graph.read
@@ -339,12 +340,12 @@ def test_warnings_are_one_line_each_and_in_the_json(wgsss: Run, tmp_path: Path) 
     lines = result.err.splitlines()
     assert lines[0].startswith("wgsss: warning: open.ply: 3 boundary edges") and result.code == 0
     assert all(line.startswith("wgsss: warning: ") for line in lines) and len(set(lines)) == len(lines)
-    told = json.loads(wgsss(*command, "--json").out)["warnings"]
-    assert [f"wgsss: warning: {text}" for text in told] == lines
+    warnings_ = json.loads(wgsss(*command, "--json").out)["warnings"]
+    assert [f"wgsss: warning: {text}" for text in warnings_] == lines
     assert json.loads(wgsss("render", *SMALL, "--json").out)["warnings"] == []
 
 
-def test_warnings_of_libraries_are_not_the_users(
+def test_warnings_of_libraries_are_not_printed(
     wgsss: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def scenes(args: object) -> None:
@@ -355,14 +356,14 @@ def test_warnings_of_libraries_are_not_the_users(
             warnings.warn("the\n   user's", Note, stacklevel=1)
 
     monkeypatch.setattr(catalogue, "scenes", scenes)
-    assert wgsss("scenes") == Said(0, "", "wgsss: warning: the user's\n")
+    assert wgsss("scenes") == Output(0, "", "wgsss: warning: the user's\n")
 
 
-# what nobody expects
+# bugs, interrupts and closed streams
 
 
 @pytest.mark.parametrize(
-    ("error", "said"),
+    ("error", "message"),
     [
         (
             IndexError("list index\nout of range"),
@@ -373,22 +374,22 @@ def test_warnings_of_libraries_are_not_the_users(
         (MemoryError("Unable to allocate 9 TiB"), "there is not enough memory for this (Unable to allocate 9 TiB)"),
     ],
 )
-def test_a_fault_of_the_program_is_one_line_and_all_of_it_on_request(
-    wgsss: Run, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+def test_a_bug_is_one_line_or_a_traceback_on_request(
+    wgsss: Run, monkeypatch: pytest.MonkeyPatch, error: Exception, message: str
 ) -> None:
     def scenes(args: object) -> None:
         raise error
 
     monkeypatch.setattr(catalogue, "scenes", scenes)
     result = wgsss("scenes")
-    assert result.err.startswith(f"wgsss: error: {said}") and result.err.count("\n") == 1
+    assert result.err.startswith(f"wgsss: error: {message}") and result.err.count("\n") == 1
     assert (result.code, result.out) == (1, "")
     monkeypatch.setenv("WGSSS_DEBUG", "1")
     lines = wgsss("scenes").err.splitlines()
     assert lines[0].startswith("Traceback") and "in scenes" in "".join(lines) and lines[-1] == result.err.rstrip()
 
 
-def test_an_interrupt_is_quiet_and_leaves_only_whole_frames(tmp_path: Path) -> None:
+def test_an_interrupt_is_quiet_and_leaves_only_complete_frames(tmp_path: Path) -> None:
     running = process("render", *SMALL, "--frames", "100000", cwd=tmp_path)
     while not (tmp_path / "sphere.0002.png").exists() and running.poll() is None:
         time.sleep(0.02)
@@ -400,7 +401,7 @@ def test_an_interrupt_is_quiet_and_leaves_only_whole_frames(tmp_path: Path) -> N
         Picture.open(path).load()
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
+def test_a_closed_pipe_is_no_error() -> None:
     running = process("materials")
     assert running.stdout and running.stderr
     running.stdout.close()
@@ -409,7 +410,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 
 @pytest.mark.parametrize("redirected", [">&-", ">&- 2>&-"])
-def test_without_standard_output_the_work_is_done(tmp_path: Path, redirected: str) -> None:
+def test_commands_work_without_standard_output(tmp_path: Path, redirected: str) -> None:
     command = shlex.join([sys.executable, "-m", "wgsss", "render", *SMALL])
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(f"{command} {redirected}", shell=True, cwd=tmp_path, env=env, stderr=subprocess.PIPE)
@@ -418,7 +419,7 @@ def test_without_standard_output_the_work_is_done(tmp_path: Path, redirected: st
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-def test_a_full_standard_output_is_told_in_one_line() -> None:
+def test_a_full_standard_output_is_an_error_of_one_line() -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     with open("/dev/full", "w") as full:
         done = subprocess.run(
@@ -428,7 +429,7 @@ def test_a_full_standard_output_is_told_in_one_line() -> None:
     assert done.stderr.startswith("wgsss: error: standard output cannot be written (")
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     from wgsss import __version__
 
     with pytest.raises(SystemExit) as end:

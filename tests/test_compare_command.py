@@ -1,4 +1,4 @@
-"""`wgsss compare`."""
+"""`wgsss compare`: text, JSON and files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[
 SMALL = ("sphere", "--vertices", "600", "--size", "32x32", "--methods", "lambert")
 
 
-def test_text_and_files(tmp_path: Path, capsys, monkeypatch):
+def test_compare_prints_text_and_writes_files(tmp_path: Path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out, err = run(capsys, *SMALL)
     lines = out.splitlines()
@@ -41,15 +41,15 @@ def test_text_and_files(tmp_path: Path, capsys, monkeypatch):
     assert numbers["methods"][0]["error"]["rel_rmse"] == pytest.approx(0.2, rel=1e-4)
 
 
-def test_json(tmp_path: Path, capsys):
+def test_json_has_errors_of_all_methods(tmp_path: Path, capsys):
     out, _ = run(capsys, *SMALL, "-o", str(tmp_path / "here"), "--json")
-    found = json.loads(out)
-    assert found.keys() == {"scene", "reference", "adapter", "size", "methods", "files", "warnings"}
-    assert found["scene"] == "sphere" and found["size"] == [32, 32]
-    assert all(Path(file).is_file() and Path(file).parent == tmp_path / "here" for file in found["files"])
+    result = json.loads(out)
+    assert result.keys() == {"scene", "reference", "adapter", "size", "methods", "files", "warnings"}
+    assert result["scene"] == "sphere" and result["size"] == [32, 32]
+    assert all(Path(file).is_file() and Path(file).parent == tmp_path / "here" for file in result["files"])
 
 
-def test_knobs_of_methods(tmp_path: Path, capsys):
+def test_knobs_of_methods_are_set(tmp_path: Path, capsys):
     methods = "deon07:map_size=64:gaussians=2, deon07:map_size=128,lambert"
     out, _ = run(capsys, *SMALL[:-1], methods, "-o", str(tmp_path / "here"), "--json")
     runs = [(run["method"], run["knobs"]) for run in json.loads(out)["methods"]]
@@ -57,7 +57,7 @@ def test_knobs_of_methods(tmp_path: Path, capsys):
     assert len(runs) == 3
 
 
-def test_lights_of_all_types(tmp_path: Path, capsys):
+def test_lights_of_all_types_are_compared(tmp_path: Path, capsys):
     argv = [*SMALL, "--lights", "all", "-o", str(tmp_path / "here")]
     rows = run(capsys, *argv)[0].split("by type of light: rel RMSE\n")[1].splitlines()
     assert rows[0].split() == ["method", "directional", "point", "area", "environment"]

@@ -1,4 +1,4 @@
-"""Folders to write to: whole or not at all, and gone again where nothing came of them."""
+"""Output folders are written completely or not at all, and removed if they stay empty."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from wgsss.errors import InputError
 from wgsss.folders import atomic_folder, created_folder
 
 
-@pytest.mark.parametrize("there", [False, True])
-def test_files_appear_at_once_beside_what_is_there(tmp_path: Path, there: bool) -> None:
+@pytest.mark.parametrize("exists", [False, True])
+def test_files_appear_together_and_old_files_stay(tmp_path: Path, exists: bool) -> None:
     folder = tmp_path / "out"
-    if there:
+    if exists:
         folder.mkdir()
         (folder / "old").write_text("old")
         (folder / "a").write_text("old")
@@ -24,25 +24,25 @@ def test_files_appear_at_once_beside_what_is_there(tmp_path: Path, there: bool) 
             (place / name).write_text("new")
         assert not (folder / "b").exists()
     assert {path.name: path.read_text() for path in folder.iterdir()} == {
-        **({"old": "old"} if there else {}),
+        **({"old": "old"} if exists else {}),
         **{"a": "new", "b": "new"},
     }
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, InputError])
-@pytest.mark.parametrize("there", [False, True])
-def test_what_fails_leaves_nothing(tmp_path: Path, error: type[BaseException], there: bool) -> None:
+@pytest.mark.parametrize("exists", [False, True])
+def test_an_error_leaves_no_files(tmp_path: Path, error: type[BaseException], exists: bool) -> None:
     folder = tmp_path / "out"
-    if there:
+    if exists:
         folder.mkdir()
     with pytest.raises(error), atomic_folder(folder) as place:
         (place / "a").write_text("new")
         raise error
-    assert list(tmp_path.iterdir()) == ([folder] if there else []) and not list(folder.glob("*"))
+    assert list(tmp_path.iterdir()) == ([folder] if exists else []) and not list(folder.glob("*"))
 
 
-def test_a_folder_in_the_place_of_a_file_keeps_all_others_away(tmp_path: Path) -> None:
+def test_a_folder_with_the_name_of_a_file_prevents_all_files(tmp_path: Path) -> None:
     (tmp_path / "out" / "b").mkdir(parents=True)
     with pytest.raises(InputError, match="b: this is a folder, in the place of a file"):
         with atomic_folder(tmp_path / "out") as place:
@@ -63,7 +63,7 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
 
 @pytest.mark.parametrize("name", BAD, ids=[name[:6].replace("\0", "NUL") for name in BAD])
 @pytest.mark.parametrize("make", [atomic_folder, created_folder])
-def test_what_is_no_folder_is_told_before_the_block(tmp_path: Path, name: str, make: Callable[[Path], object]) -> None:
+def test_invalid_folders_are_errors_before_the_block(tmp_path: Path, name: str, make: Callable[[Path], object]) -> None:
     prepare, says = BAD[name]
     prepare(tmp_path / name)
     before = list(tmp_path.iterdir())
@@ -73,7 +73,7 @@ def test_what_is_no_folder_is_told_before_the_block(tmp_path: Path, name: str, m
     assert list(tmp_path.iterdir()) == before
 
 
-def test_folders_made_for_nothing_go_again_and_others_stay(tmp_path: Path) -> None:
+def test_empty_new_folders_are_removed_and_others_stay(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     with created_folder(tmp_path / "a" / "b" / "c"):
         assert (tmp_path / "a" / "b" / "c").is_dir()

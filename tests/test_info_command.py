@@ -1,4 +1,4 @@
-"""`wgsss info FILE`: what a stranger reads of a file, and what a program does."""
+"""`wgsss info FILE`: its text and its JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MARBLE_MM = 19.5
 
 @pytest.fixture
 def info(capsys: pytest.CaptureFixture[str]) -> Any:
-    """What the command prints of a file, which is all that it prints."""
+    """Return the output of the command, which must not print anything else."""
 
     def run(path: Path, *options: str) -> str:
         assert main(["info", str(path), *options]) == 0
@@ -32,13 +32,13 @@ def info(capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 def lines_of(text: str) -> dict[str, str]:
-    """The lines above the first empty one, by their first word."""
+    """Return the lines above the first empty line, by their first word."""
     head = text.split("\n\n")[0].splitlines()
     return {line.split("  ")[0]: line[line.index("  ") :].strip() for line in head}
 
 
 def table_of(text: str) -> list[dict[str, str]]:
-    """The table of bodies, by the names of its columns."""
+    """Return the table of bodies, by the names of its columns."""
     first, *rows = text.split("\n\n")[1].splitlines()
     names = [name for name in first.replace(", mm", "-mm").replace("light spreads", "light-spreads").split()]
     starts = [first.index(name.replace("-mm", ", mm").replace("-", " ")) for name in names]
@@ -46,7 +46,7 @@ def table_of(text: str) -> list[dict[str, str]]:
     return [{n: row[a:b].strip() for n, a, b in zip(names, starts, ends, strict=True)} for row in rows]
 
 
-def test_a_mesh(tmp_path: Path, info: Any) -> None:
+def test_info_describes_a_mesh(tmp_path: Path, info: Any) -> None:
     path = checkered().save(tmp_path / "ball.glb")
     text = info(path)
     head, (body,) = lines_of(text), table_of(text)
@@ -59,13 +59,13 @@ def test_a_mesh(tmp_path: Path, info: Any) -> None:
     assert text.rstrip().endswith("notes  all that it holds is used")
 
 
-def test_a_mesh_of_a_format_without_a_unit(tmp_path: Path, info: Any) -> None:
+def test_info_of_a_format_without_a_unit(tmp_path: Path, info: Any) -> None:
     (tmp_path / "tetra.obj").write_text("v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     head = lines_of(info(tmp_path / "tetra.obj"))
     assert head["unit"].startswith("not stated: taken for a millimetre") and head["size"] == "9 x 9 x 9 mm"
 
 
-def test_all_that_a_mesh_file_can_hold(tmp_path: Path, info: Any) -> None:
+def test_info_describes_all_contents_of_a_mesh_file(tmp_path: Path, info: Any) -> None:
     file = File()
     red = file.add(
         "materials", name="red", pbrMetallicRoughness={"baseColorFactor": [1, 0.25, 0, 1], "metallicFactor": 0}
@@ -93,14 +93,14 @@ def test_all_that_a_mesh_file_can_hold(tmp_path: Path, info: Any) -> None:
         "3 lights of the file are not used (--file-lights uses them)",
         "1 camera of the file is not used (--file-camera uses it)",
     ]
-    found = json.loads(info(path, "--json"))
-    assert found["notes"] == [f"two.glb: {note}" for note in notes]
-    assert [body["moves"] for body in found["bodies"]] == [True, False]
-    assert (found["animations"], found["plays"], found["mm_per_unit"]) == (["Walk", "Run"], "Walk", 1000.0)
-    assert [light["kind"] for light in found["lights"]] == ["point", "directional", "directional"]
+    result = json.loads(info(path, "--json"))
+    assert result["notes"] == [f"two.glb: {note}" for note in notes]
+    assert [body["moves"] for body in result["bodies"]] == [True, False]
+    assert (result["animations"], result["plays"], result["mm_per_unit"]) == (["Walk", "Run"], "Walk", 1000.0)
+    assert [light["kind"] for light in result["lights"]] == ["point", "directional", "directional"]
 
 
-def test_what_is_repaired_and_what_is_missing(tmp_path: Path, info: Any) -> None:
+def test_info_notes_repairs_and_missing_files(tmp_path: Path, info: Any) -> None:
     file = checkered("gone.png")
     corners = file.tree["meshes"][0]["primitives"][0]
     accessor = file.tree["accessors"][corners["indices"]]
@@ -110,7 +110,7 @@ def test_what_is_repaired_and_what_is_missing(tmp_path: Path, info: Any) -> None
     assert "gone.png" in text and table_of(text)[0]["has"] == ""
 
 
-def test_of_very_many_bodies_the_first_are_listed(tmp_path: Path, info: Any) -> None:
+def test_info_lists_the_first_of_many_bodies(tmp_path: Path, info: Any) -> None:
     file = File()
     for number in range(45):
         pbr = {"baseColorFactor": [number / 45, 0.5, 0.5, 1], "metallicFactor": 0}
@@ -122,7 +122,7 @@ def test_of_very_many_bodies_the_first_are_listed(tmp_path: Path, info: Any) -> 
     assert len(json.loads(info(path, "--json"))["bodies"]) == 45
 
 
-def test_a_scene_a_material_and_a_sky(tmp_path: Path, info: Any) -> None:
+def test_info_describes_scenes_materials_and_skies(tmp_path: Path, info: Any) -> None:
     sky = write_environment(tmp_path / "sky.exr", np.full((4, 8, 3), (1, 2, 3), np.float32))
     (tmp_path / "wax.toml").write_text("sigma_a = [0.01, 0.02, 0.03]\nsigma_s_prime = [1, 1, 1]\n")
     (tmp_path / "scene.toml").write_text(
@@ -154,7 +154,7 @@ def test_a_scene_a_material_and_a_sky(tmp_path: Path, info: Any) -> None:
         ("a.exr", b"x", "a.exr: "),
     ],
 )
-def test_what_cannot_be_read_is_one_line(
+def test_unreadable_files_are_errors_of_one_line(
     tmp_path: Path, name: str, content: bytes | None, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if content is not None:
@@ -179,7 +179,7 @@ REAL = (
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files(data: Path, info: Any, name: str) -> None:
+def test_info_describes_real_files(data: Path, info: Any, name: str) -> None:
     text = info(data / name)
     head = lines_of(text)
     assert head["file"] == str(data / name) and head["size"] and len(text.rstrip().split("\n\n")) in (2, 3)

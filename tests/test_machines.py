@@ -1,4 +1,4 @@
-"""wgsss can be installed, without a compiler, on every machine and with every Python that it promises."""
+"""wgsss can be installed without a compiler on every supported machine with every supported Python."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from packaging.version import Version
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 WITHOUT = {"viewer": "macOS x86_64", "reference": "macOS x86_64"}
-"""Extras that a system goes without: imgui-bundle and Mitsuba have no wheels for Macs with an Intel processor."""
+"""extras that are not available on a system: imgui-bundle and Mitsuba have no wheels for Macs with Intel processors"""
 LISTER = ROOT / "tests" / "wheels.py"
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-SYSTEMS = {  # what markers ask, of the systems that wheels.py names
+SYSTEMS = {  # values of environment markers for the systems of wheels.py
     "Linux x86_64": {"sys_platform": "linux", "platform_machine": "x86_64"},
     "Linux aarch64": {"sys_platform": "linux", "platform_machine": "aarch64"},
     "macOS x86_64": {"sys_platform": "darwin", "platform_machine": "x86_64"},
@@ -48,20 +48,22 @@ MACHINES = {
 def needed(
     texts: list[str], environment: dict[str, str], extras: frozenset[str] = frozenset()
 ) -> Iterator[Requirement]:
-    """What requirements ask for on a machine, and what that asks for in turn, as far as it is installed here."""
+    """Yield requirements for a machine, and recursively those of the packages that are installed here."""
     seen = set()
     queue = [(text, extras) for text in texts]
     while queue:
         text, extras = queue.pop()
-        wanted = Requirement(text)
-        if wanted.marker and not any(wanted.marker.evaluate({**environment, "extra": e}) for e in ("", *extras)):
+        requirement = Requirement(text)
+        if requirement.marker and not any(
+            requirement.marker.evaluate({**environment, "extra": e}) for e in ("", *extras)
+        ):
             continue
-        yield wanted
-        key = (canonicalize_name(wanted.name), frozenset(wanted.extras))
+        yield requirement
+        key = (canonicalize_name(requirement.name), frozenset(requirement.extras))
         if key not in seen:
             seen.add(key)
             try:
-                queue += [(inner, key[1]) for inner in requires(wanted.name) or ()]
+                queue += [(inner, key[1]) for inner in requires(requirement.name) or ()]
             except PackageNotFoundError:
                 continue
 
@@ -72,9 +74,11 @@ def asked(extra: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def wheels() -> dict[str, dict[str, list[str]]]:
-    """Versions that have a wheel, by machine and package."""
-    every = [wanted for extra in ("", *EXTRAS) for env in MACHINES.values() for wanted in needed(asked(extra), env)]
-    names = sorted({canonicalize_name(wanted.name) for wanted in every})
+    """Return the versions with a wheel, by machine and package."""
+    every = [
+        requirement for extra in ("", *EXTRAS) for env in MACHINES.values() for requirement in needed(asked(extra), env)
+    ]
+    names = sorted({canonicalize_name(requirement.name) for requirement in every})
     if not list_wheels(["numpy"], patience=60)[next(iter(MACHINES))]["numpy"]:
         pytest.skip("no package index answers")
     return list_wheels(names, patience=240)
@@ -96,33 +100,35 @@ def test_every_package_has_a_wheel(wheels: dict[str, dict[str, list[str]]], extr
     for machine, environment in MACHINES.items():
         if extra in WITHOUT and machine.endswith(WITHOUT[extra]):
             continue
-        wanted: dict[str, Any] = {}
-        for one in needed(asked(extra), environment):
-            name = canonicalize_name(one.name)
-            wanted[name] = wanted.get(name, one.specifier) & one.specifier
-        for name, versions in wanted.items():
-            found = [v for v in wheels[machine][name] if versions.contains(v, prereleases=False)]
-            if not found:
+        specifiers: dict[str, Any] = {}
+        for requirement in needed(asked(extra), environment):
+            name = canonicalize_name(requirement.name)
+            specifiers[name] = specifiers.get(name, requirement.specifier) & requirement.specifier
+        for name, versions in specifiers.items():
+            matching = [v for v in wheels[machine][name] if versions.contains(v, prereleases=False)]
+            if not matching:
                 missing.append(f"{machine}: no wheel of {name} {versions}".rstrip())
     assert not missing, "\n".join(missing)
 
 
-def test_a_package_without_a_wheel_is_named(wheels: dict[str, dict[str, list[str]]]) -> None:
-    """The test above would see it."""
+def test_missing_wheels_are_detected(wheels: dict[str, dict[str, list[str]]]) -> None:
+    """The lookup finds no wheel where there is none, so that the test above can fail."""
     assert not wheels["Python 3.14, Linux x86_64"]["xatlas"] and not wheels["Python 3.11, Linux aarch64"]["embreex"]
     assert wheels["Python 3.11, Linux x86_64"]["xatlas"] and wheels["Python 3.14, Windows AMD64"]["numpy"]
 
 
 @pytest.mark.parametrize(("machine", "environment"), MACHINES.items(), ids=MACHINES)
-def test_every_machine_casts_rays_and_unwraps_one_way(machine: str, environment: dict[str, str]) -> None:
-    names = {one.name for one in needed(PROJECT["dependencies"], environment)}
+def test_every_machine_has_one_package_for_rays_and_one_for_unwrapping(
+    machine: str, environment: dict[str, str]
+) -> None:
+    names = {requirement.name for requirement in needed(PROJECT["dependencies"], environment)}
     assert len(names & {"embreex", "libigl"}) == len(names & {"xatlas", "uvunwrap"}) == 1
 
 
 def test_bounds_are_versions_that_exist(wheels: dict[str, dict[str, list[str]]]) -> None:
-    """So that `make test-lowest` can install them."""
+    """`make test-lowest` installs these versions."""
     for text in PROJECT["dependencies"]:
-        wanted = Requirement(text)
-        (lowest,) = [s.version for s in wanted.specifier if s.operator == ">="]
-        found = {Version(v) for machine in wheels.values() for v in machine[canonicalize_name(wanted.name)]}
-        assert Version(lowest) in found, text
+        requirement = Requirement(text)
+        (lowest,) = [s.version for s in requirement.specifier if s.operator == ">="]
+        available = {Version(v) for machine in wheels.values() for v in machine[canonicalize_name(requirement.name)]}
+        assert Version(lowest) in available, text

@@ -1,4 +1,4 @@
-"""`wgsss profile`."""
+"""`wgsss profile`: text, JSON, CSV and plots."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[
     return out, err
 
 
-def test_json_has_what_scripts_read(capsys):
+def test_json_has_all_fields(capsys):
     out, _ = run(capsys, "Skin1", "--model", "dipole", "--model", "burley", "--r", "0.1,0.5,2", "--k", "4", "--json")
     result = json.loads(out)
     assert result["material"] == "skin1" and [m["model"] for m in result["models"]] == ["dipole", "burley"]
@@ -45,7 +45,7 @@ def test_text_has_totals_ranges_and_errors(capsys):
     assert "total T" in out and "multipole T" in out and "3 mm thick" in out
 
 
-def test_csv_of_a_model_is_a_table_that_a_material_can_have(tmp_path: Path, capsys):
+def test_csv_of_a_model_can_be_the_table_of_a_material(tmp_path: Path, capsys):
     out, _ = run(capsys, "skin1", "--model", "dipole", "--csv")
     rows = list(csv.reader(io.StringIO(out)))
     assert rows[0] == ["r_mm", "dipole_R_red", "dipole_R_green", "dipole_R_blue"] and len(rows) == 65
@@ -68,8 +68,8 @@ def test_a_material_with_layers(tmp_path: Path, capsys):
     assert "material 'two': layer 1 is infinitely thick" in err
 
 
-def test_layers_too_thin_for_diffusion_are_for_photons_only(tmp_path: Path, capsys):
-    """Van de Hulst's slab: R 0.09739, T 0.66096."""
+def test_layers_too_thin_for_diffusion_need_the_photon_model(tmp_path: Path, capsys):
+    """The slab of van de Hulst has R = 0.09739 and T = 0.66096."""
     path = tmp_path / "slab.toml"
     layer = "[[layers]]\nsigma_a = [1, 1, 1]\nsigma_s_prime = [2.25, 2.25, 2.25]\ng = 0.75\neta = 1\nthickness = 0.2\n"
     path.write_text(layer)
@@ -87,11 +87,11 @@ def test_layers_too_thin_for_diffusion_are_for_photons_only(tmp_path: Path, caps
 def test_help_names_every_model(capsys):
     with pytest.raises(SystemExit):
         main(["profile", "--help"])
-    said = " ".join(capsys.readouterr().out.split())
-    assert all(name in said for name in MODELS)
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(name in text for name in MODELS)
 
 
-def test_plot(tmp_path: Path, capsys):
+def test_a_plot_is_written(tmp_path: Path, capsys):
     out, _ = run(capsys, "marble", "-o", str(tmp_path / "a.png"))
     assert (tmp_path / "a.png").stat().st_size > 10_000 and "a.png" in out
 
@@ -174,11 +174,11 @@ def test_bad_materials_are_one_line(text, says, tmp_path: Path, capsys):
     assert err.count("\n") == 1 and "bad." in err and re.search(says, err), err
 
 
-def test_a_material_by_its_reflectance_and_mean_free_path(tmp_path: Path):
+def test_a_material_may_be_defined_by_reflectance_and_mean_free_path(tmp_path: Path):
     path = tmp_path / "own.toml"
     path.write_text(
         'preset = "skin"\nreflectance = [0.436, 0.2273, 0.131]\nmean_free_path = [1.2953, 0.9524, 0.6711]\neta = 1.3'
     )
-    found = load_material(path)
-    np.testing.assert_allclose(found.sigma_a, SKIN1.sigma_a, rtol=2e-3)
-    np.testing.assert_allclose(found.sigma_s_prime, SKIN1.sigma_s_prime, rtol=2e-3)
+    material = load_material(path)
+    np.testing.assert_allclose(material.sigma_a, SKIN1.sigma_a, rtol=2e-3)
+    np.testing.assert_allclose(material.sigma_s_prime, SKIN1.sigma_s_prime, rtol=2e-3)

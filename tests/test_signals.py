@@ -1,4 +1,4 @@
-"""Signals that ask a command to end: quietly, with the exit code that shells give them, and with nothing left."""
+"""Signals end a command quietly, with the usual exit code, and leave no files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
 
 def start(folder: Path, *argv: str, code: str = "", cache: str = "cache") -> subprocess.Popen[str]:
-    """The command in a folder, with code that runs before it."""
+    """Start the command in a folder, after some code."""
     script = f"{code}\nfrom wgsss.cli import main\nraise SystemExit(main())"
     env = {**os.environ, "PYTHONPATH": str(ROOT), "WGSSS_CACHE": str(folder / cache)}
     command = [sys.executable, "-c", script, *argv]
@@ -30,12 +30,12 @@ def wait_for(running: subprocess.Popen[str], folder: Path, pattern: str) -> None
     assert running.poll() is None, running.communicate()
 
 
-def left(folder: Path) -> list[str]:
+def remaining(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*") if path.is_file() and path.suffix != ".npz")
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_a_film_is_ended_and_nothing_of_it_left(tmp_path: Path, number: int) -> None:
+def test_a_signal_ends_a_film_and_leaves_no_files(tmp_path: Path, number: int) -> None:
     running = start(
         tmp_path, "render", *SPHERE, "--method", "lambert", "--size", "64x64", "--frames", "90000", "-o", "a.mp4"
     )
@@ -43,7 +43,7 @@ def test_a_film_is_ended_and_nothing_of_it_left(tmp_path: Path, number: int) -> 
     time.sleep(0.3)
     running.send_signal(number)
     assert running.communicate(timeout=20) == ("", "")
-    assert running.returncode == 128 + number and left(tmp_path) == []
+    assert running.returncode == 128 + number and remaining(tmp_path) == []
 
 
 SLOW = """
@@ -58,12 +58,12 @@ unwrap._unwrap = slow
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_a_bake_is_ended(tmp_path: Path, number: int) -> None:
+def test_a_signal_ends_a_bake(tmp_path: Path, number: int) -> None:
     running = start(tmp_path, "bake", *SPHERE, code=SLOW)
     wait_for(running, tmp_path, "baking")
     running.send_signal(number)
     assert running.communicate(timeout=20) == ("", "")
-    assert running.returncode == 128 + number and left(tmp_path) == ["baking"]
+    assert running.returncode == 128 + number and remaining(tmp_path) == ["baking"]
 
 
 CLEANING = """
@@ -82,7 +82,7 @@ catalogue.scenes = slow
 """
 
 
-def test_signals_that_follow_do_not_break_the_cleaning_up(tmp_path: Path) -> None:
+def test_further_signals_do_not_interrupt_the_clean_up(tmp_path: Path) -> None:
     running = start(tmp_path, "scenes", code=CLEANING)
     wait_for(running, tmp_path, "working")
     running.send_signal(signal.SIGTERM)
@@ -109,13 +109,13 @@ unwrap._unwrap = slow
 """
 
 
-def test_a_signal_that_comes_while_an_object_is_freed_is_not_lost(tmp_path: Path) -> None:
+def test_a_signal_during_a_destructor_is_not_lost(tmp_path: Path) -> None:
     running = start(tmp_path, "bake", *SPHERE, code=LOST)
     assert running.communicate(timeout=30) == ("", "")
     assert running.returncode == 143
 
 
-def test_a_signal_that_was_ignored_before_stays_so(tmp_path: Path) -> None:
+def test_a_signal_that_was_ignored_stays_ignored(tmp_path: Path) -> None:
     argv = ["render", *SPHERE, "--method", "lambert", "--size", "8x8", "--frames", "40", "-o", "a.png"]
     running = start(tmp_path, *argv, code="import signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)")
     wait_for(running, tmp_path, "a.0001.png")
@@ -136,7 +136,7 @@ catalogue.scenes = slow
 """
 
 
-def test_a_signal_of_which_a_library_makes_another_exception_is_one_all_the_same(tmp_path: Path) -> None:
+def test_a_signal_that_a_library_converts_to_another_exception_ends_the_command(tmp_path: Path) -> None:
     running = start(tmp_path, "scenes", code=CHANGED)
     wait_for(running, tmp_path, "working")
     running.send_signal(signal.SIGTERM)

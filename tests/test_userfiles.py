@@ -1,4 +1,4 @@
-"""Files that users name: what cannot be read is told before anything opens it."""
+"""Files named by users are checked before they are opened."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def sparse(path: Path) -> None:
 
 
 def listening(path: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as made:
-        made.bind(str(path))
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
 
 
 KINDS: dict[str, tuple[Callable[[Path], object], str]] = {
@@ -39,7 +39,7 @@ KINDS: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_reader_refuses_what_is_no_file(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_reader_refuses_special_files(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make, says = KINDS[kind]
     monkeypatch.chdir(tmp_path)  # names of sockets must be short
     readers: dict[str, Callable[[Path], object]] = {"a.toml": load_scene, "b.toml": load_material}
@@ -54,12 +54,12 @@ def test_every_reader_refuses_what_is_no_file(kind: str, tmp_path: Path, monkeyp
     ("name", "says"),
     [("x" * 300, "File name too long"), ("a\0b", "is not the name of a file"), ("a/" * 3000, "too long")],
 )
-def test_names_that_no_file_can_have(name: str, says: str) -> None:
+def test_impossible_file_names_are_errors(name: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         require_file(Path(name))
 
 
-def test_home_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_home_folders_are_expanded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     assert path_from("~/a.ply", Path("folder")) == tmp_path / "a.ply"
     assert path_from("a.ply", Path("folder")) == Path("folder/a.ply")

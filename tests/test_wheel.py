@@ -1,4 +1,4 @@
-"""What `pip install` of the wheel brings: all that the program needs, without the checkout."""
+"""The wheel contains all that the program needs, without the checkout."""
 
 from __future__ import annotations
 
@@ -38,35 +38,35 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def site(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with wgsss as installed, to be found before the checkout. What it needs comes from the environment."""
+    """Install wgsss into a folder for PYTHONPATH. Its dependencies come from the environment."""
     folder = tmp_path_factory.mktemp("site")
     run("-m", "pip", "install", "-q", "--no-deps", "--no-index", "--target", folder, wheel, cwd=folder)
     return folder
 
 
-def test_it_has_every_file_of_the_package_and_no_others(wheel: Path) -> None:
+def test_the_wheel_has_all_files_of_the_package_and_no_others(wheel: Path) -> None:
     listed = subprocess.run(["git", "ls-files", "wgsss", "wgsl"], cwd=ROOT, capture_output=True, text=True).stdout
-    wanted = {f"wgsss/{name}" if name.startswith("wgsl/") else name for name in listed.splitlines()}
-    if not wanted:
+    expected = {f"wgsss/{name}" if name.startswith("wgsl/") else name for name in listed.splitlines()}
+    if not expected:
         pytest.skip("not a git checkout")
-    found = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    assert found == wanted
-    assert {"wgsss/py.typed", "wgsss/study/report.html", "wgsss/wgsl/fresnel.wgsl"} <= found
+    packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert packed == expected
+    assert {"wgsss/py.typed", "wgsss/study/report.html", "wgsss/wgsl/fresnel.wgsl"} <= packed
 
 
-def test_it_renders_from_an_empty_folder(site: Path, tmp_path: Path) -> None:
+def test_the_installed_package_renders_in_an_empty_folder(site: Path, tmp_path: Path) -> None:
     place = run("-c", "import wgsss; print(wgsss.__file__)", cwd=tmp_path, PYTHONPATH=str(site))
     assert Path(place.strip()).is_relative_to(site)
     command = ["-m", "wgsss", "render", "sphere", "--vertices", "500", "--size", "32x32", "--json"]
-    made = json.loads(run(*command, cwd=tmp_path, PYTHONPATH=str(site)))
-    assert made["files"] == ["sphere.png"]
+    result = json.loads(run(*command, cwd=tmp_path, PYTHONPATH=str(site)))
+    assert result["files"] == ["sphere.png"]
     with Picture.open(tmp_path / "sphere.png") as picture:
         pixels = np.asarray(picture)
     assert pixels[16, 16, 3] == 255 and pixels[16, 16, :3].max() > 40
     assert [path.name for path in tmp_path.iterdir()] == ["sphere.png"]
 
 
-def test_every_module_of_shaders_is_found(site: Path, tmp_path: Path) -> None:
+def test_the_installed_package_finds_all_shaders(site: Path, tmp_path: Path) -> None:
     script = """
 from pathlib import Path
 import wgsss
