@@ -137,7 +137,7 @@ def test_the_entry_of_another_key_is_not_taken(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["folder", "fifo", "link to a device", "link to itself"])
-def test_what_is_in_the_place_of_an_entry_is_replaced_or_used_around(folder: Path, kind: str) -> None:
+def test_a_file_or_folder_in_the_place_of_an_entry_is_replaced_or_ignored(folder: Path, kind: str) -> None:
     cached("thing", ["k"], Maker())
     (path,) = folder.iterdir()
     path.unlink()
@@ -188,7 +188,7 @@ def test_an_entry_is_made_with_one_blas_thread_also_after_another_that_it_needs(
     assert (seen, threads()) == ([{1}], before)
 
 
-def test_what_fails_leaves_nothing(folder: Path) -> None:
+def test_a_failed_write_leaves_no_file(folder: Path) -> None:
     def fail() -> dict[str, np.ndarray]:
         raise RuntimeError("no")
 

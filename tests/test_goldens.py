@@ -150,7 +150,7 @@ def test_there_is_no_golden_that_nothing_draws() -> None:
 
 
 @needs_flip
-def test_what_other_drivers_may_change_is_less_than_what_a_method_changes() -> None:
+def test_the_tolerance_for_other_drivers_is_smaller_than_the_effect_of_any_method() -> None:
     for scene, method in product(SCENES, METHODS.keys() - {"lambert"}):
         plain, other = (read(golden_path(scene, name)).pixels for name in ("lambert", method))
         assert flip(other, plain) > MOST_FLIP or (scene, method) in BELOW_PIXELS, f"{scene} {method}"

@@ -80,7 +80,7 @@ def entries() -> dict[Path, int]:
 
 
 def _read(path: Path) -> Arrays | None:
-    """Return the arrays of an entry, or None where there is no file, or a file that is of no use, with a warning."""
+    """Return the arrays of an entry, or None where there is no file, or a file that cannot be used, with a warning."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise ValueError
@@ -92,7 +92,7 @@ def _read(path: Path) -> Arrays | None:
         return None
     except Exception as error:  # a damaged file can fail in any way: bad zip, bad checksum, bad array header
         why = getattr(error, "strerror", None) or "damaged, or of other content"
-        warnings.warn(f"{path}: this cache entry is of no use ({why}): made anew", Note, stacklevel=3)
+        warnings.warn(f"{path}: this cache entry cannot be used ({why}) and is computed again", Note, stacklevel=3)
         return None
     return arrays
 

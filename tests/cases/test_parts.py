@@ -197,7 +197,7 @@ def test_bodies_of_a_mesh_in_a_scene_file_are_placed_together(tmp_path: Path) ->
 def test_joining_parts_notes_the_differences(tmp_path: Path) -> None:
     """`load_mesh` joins all parts of a file into one mesh."""
     path = head(tmp_path)
-    with pytest.warns(UserWarning, match="base_color textures left out: the parts do not share a single one"):
+    with pytest.warns(UserWarning, match="base_color textures left out: the parts do not all have the same one"):
         joined = load_mesh(path)
     assert joined.maps.base_color is None and joined.mesh.corner_uvs is not None
     assert np.ptp(joined.mesh.bounds, axis=0)[0] == pytest.approx(300, abs=2)

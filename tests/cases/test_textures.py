@@ -134,7 +134,7 @@ def test_two_textures_with_different_samplers(tmp_path: Path, spread: float, lef
     file.node(mesh=file.mesh(ball_primitive(file, material, attributes=attributes)))
     scene, lines = scene_and_notes(file, tmp_path)
     assert (scene.objects[0].material.maps.normal is None) == left_out
-    assert lines == (["normal texture image 0 left out: it repeats otherwise than image 1"] if left_out else [])
+    assert lines == (["normal texture image 0 left out: it is wrapped differently from image 1"] if left_out else [])
 
 
 def test_two_textures_over_one_set_are_both_used(tmp_path: Path) -> None:

@@ -375,7 +375,7 @@ def test_a_texture_must_be_shared_by_all_parts(tmp_path: Path) -> None:
     assert quiet_load(export(two(shared, shared), tmp_path / "same.glb")).maps.base_color is not None
     loaded, text = load_with_warning(export(two(shared, image(4, 5, 6)), tmp_path / "two.glb"))
     assert loaded.maps.base_color is None
-    assert text == "two.glb: base_color textures left out: the parts do not share a single one"
+    assert text == "two.glb: base_color textures left out: the parts do not all have the same one"
     assert loaded.mesh.corner_uvs is not None
 
 
@@ -620,7 +620,7 @@ def test_arrays_are_read_only_copies() -> None:
     ("fields", "message"),
     [
         ({"positions": np.zeros((8, 2))}, "thing: positions must be N x 3, not 8 x 2"),
-        ({"faces": [(0, 1, 8)]}, "a face names a vertex that is not there"),
+        ({"faces": [(0, 1, 8)]}, "a face refers to a vertex that does not exist"),
         ({"faces": np.zeros((0, 3), int)}, "the mesh has no faces"),
         ({"positions": np.full((8, 3), np.nan)}, "positions holds a number that is not finite"),
         ({"corner_uvs": np.zeros((8, 2))}, "corner_uvs must be 12 x 3 x 2, not 8 x 2"),

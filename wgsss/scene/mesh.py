@@ -49,7 +49,7 @@ class Mesh:
         if not corners:
             raise InputError(f"{self.name}: the mesh has no faces")
         if self.faces.min() < 0 or self.faces.max() >= len(self.positions):
-            raise InputError(f"{self.name}: a face names a vertex that is not there")
+            raise InputError(f"{self.name}: a face refers to a vertex that does not exist")
         size = float(np.ptp(self.positions, axis=0).max())
         if not (self.shrunk or MIN_SIZE <= size) or size > MAX_SIZE:
             raise InputError(f"{self.name}: a size of {size:g} mm is out of range ({MIN_SIZE:g} to {MAX_SIZE:g})")

@@ -95,7 +95,7 @@ def _uvs(parts: Sequence[Part], look: Look, say: Callable[[str], None]) -> Array
     uvs = np.concatenate([uvs for uvs in by_part if uvs is not None])
     bad = ~(np.abs(uvs) <= FARTHEST_UV).all(axis=1)
     if bad.any():
-        say(f"{counted(int(bad.sum()), 'texture coordinate')} not finite or beyond {FARTHEST_UV:g}, taken as 0")
+        say(f"{counted(int(bad.sum()), 'texture coordinate')} not finite or beyond {FARTHEST_UV:g}, replaced by 0")
         uvs = np.where(bad[:, None], 0.0, uvs)
     return uvs
 

@@ -51,13 +51,13 @@ def usable_look(part: Part, say: Say) -> Look:
         if texture is None:
             continue
         if (texture.coordinates, texture.transform) != (first.coordinates, first.transform):
-            say(f"{slot} texture {texture.name} left out: it lies over other coordinates than {first.name}")
+            say(f"{slot} texture {texture.name} left out: its texture coordinates differ from those of {first.name}")
             look = _without(look, slot)
         elif texture.wrap != first.wrap and not _within(coordinates(part, look)):
-            say(f"{slot} texture {texture.name} left out: it repeats otherwise than {first.name}")
+            say(f"{slot} texture {texture.name} left out: it is wrapped differently from {first.name}")
             look = _without(look, slot)
         elif texture.nearest != first.nearest:
-            say(f"{slot} texture {texture.name} is interpolated, or not, as {first.name} is")
+            say(f"{slot} texture {texture.name} uses the interpolation of {first.name}")
     return look
 
 
@@ -71,7 +71,7 @@ def shared(looks: list[Look], say: Say) -> Look:
     first = looks[0]
     for slot in SLOTS:
         if any(_texture(look, slot) != _texture(first, slot) for look in looks):
-            say(f"{slot} textures left out: the parts do not share a single one")
+            say(f"{slot} textures left out: the parts do not all have the same one")
             first = _without(first, slot)
     for name in ("base_color", "cutoff", "medium", "eta", "roughness", "specular", "normal_scale"):
         if any(getattr(look, name) != getattr(first, name) for look in looks):
@@ -107,7 +107,7 @@ class TextureReader:
             textures = replace(textures, wrap=first.wrap, nearest=first.nearest)
         scale = min(max(look.normal_scale, -STEEPEST), STEEPEST)
         if scale != look.normal_scale:
-            self._say(f"a normal scale of {look.normal_scale:g} taken as {scale:g}")
+            self._say(f"a normal scale of {look.normal_scale:g} is replaced by {scale:g}")
         return replace(textures, normal_scale=scale, tint=look.base_color)
 
     def mask(self, look: Look) -> Mask | None:
