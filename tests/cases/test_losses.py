@@ -108,7 +108,7 @@ EACH_ONCE: tuple[tuple[str, ...], ...] = (
     ("colours clipped",),
     ("index of refraction of 0",),
     ("the colour of KHR_materials_specular",),
-    ("normal texture", "other coordinates"),
+    ("normal texture", "its texture coordinates differ"),
     *((f"{name} left out",) for name in MATERIAL_EXTENSIONS),
     # of vertices
     ("normals that are not finite", "1 vertex"),
