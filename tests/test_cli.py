@@ -88,7 +88,7 @@ def test_references_are_listed_after_the_methods(wgsss: Run) -> None:
 
 
 def test_a_method_that_is_a_pair_is_listed_with_its_parts(wgsss: Run) -> None:
-    assert re.search(r"^deon07 .* = texture\+tsm$", wgsss("methods").out, re.M)
+    assert re.search(r"^deon07 .* \(the pair texture\+tsm\)$", wgsss("methods").out, re.M)
     pairs = {method["name"]: method["pair"] for method in json.loads(wgsss("methods", "--json").out)["methods"]}
     assert (pairs["deon07"], pairs["barre11"], pairs["lambert"]) == ("texture+tsm", "none+thickness", None)
 
@@ -97,6 +97,15 @@ def test_methods_list_surfaces_and_translucencies_for_pairs(wgsss: Run) -> None:
     pairs = json.loads(wgsss("methods", "--json").out)["pairs"]
     assert pairs == {"surface": list(SURFACES), "translucency": ["none", *TRANSLUCENCIES]}
     assert f"--surface one of {', '.join(SURFACES)}" in wgsss("methods").out
+
+
+def test_pairs_list_the_surface_methods_that_fit_their_translucency_method(wgsss: Run) -> None:
+    methods = {method["name"]: method for method in json.loads(wgsss("methods", "--json").out)["methods"]}
+    surfaces = {
+        name: [knob for knob in method["knobs"] if knob["name"] == "surface"] for name, method in methods.items()
+    }
+    assert [name for name, knobs in surfaces.items() if knobs] == ["jimenez15", "barre11", "sam"]
+    assert (surfaces["sam"][0]["default"], surfaces["sam"][0]["choices"]) == ("texture", ["texture", "screen", "none"])
 
 
 def test_methods_list_knobs_with_unit_default_and_range(wgsss: Run) -> None:

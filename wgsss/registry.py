@@ -98,11 +98,16 @@ def kind_of(name: str) -> type[Method]:
         raise unknown("translucency", translucency, ("none", *TRANSLUCENCIES))
     if translucency == "none":
         return SURFACES[surface]
-    part = TRANSLUCENCIES[translucency]
-    fitting = [name for name, kind in SURFACES.items() if issubclass(kind, part.beside)]
+    fitting = surfaces_for(translucency)
     if surface not in fitting:
         raise InputError(f"translucency {translucency} goes with surface {' or '.join(fitting)}, not with {surface}")
-    return pair(SURFACES[surface], part)
+    return pair(SURFACES[surface], TRANSLUCENCIES[translucency])
+
+
+def surfaces_for(translucency: str) -> list[str]:
+    """Return the names of the surface methods that form a pair with a translucency method."""
+    needed = TRANSLUCENCIES[translucency].beside
+    return [name for name, kind in SURFACES.items() if issubclass(kind, needed)]
 
 
 def make_method(name: str, knobs: Mapping[str, Any] | None = None) -> Method:
@@ -117,7 +122,7 @@ def make_method(name: str, knobs: Mapping[str, Any] | None = None) -> Method:
     if pair_name is not None and "surface" in values:
         name = f"{values.pop('surface')}+{pair_name.partition('+')[2]}"
         kind = kind_of(name)
-    return kind(**parsed(name, kind, values))
+    return kind(**parsed(name, kind, values, () if pair_name is None else ("surface",)))
 
 
 def sweep_of(name: str) -> tuple[dict[str, Any], ...]:

@@ -98,7 +98,7 @@ def test_the_knobs_of_the_new_surface_method_can_be_set_beside_it() -> None:
         ("sam", {"surface": "paper"}, "unknown surface 'paper'"),
         ("sam", {"surface": 3}, "unknown surface '3'"),
         ("sam", {"surface": "screen", "map_size": 64}, r"unknown knob of screen\+sam 'map_size'"),
-        ("sam", {"surfaces": "screen"}, "unknown knob of sam 'surfaces'"),
+        ("sam", {"surfaces": "screen"}, "unknown knob of sam 'surfaces'; did you mean 'surface'"),
         ("deon07", {"surface": "screen"}, "translucency tsm goes with surface texture, not with screen"),
         ("lambert", {"surface": "screen"}, "unknown knob of lambert 'surface'"),
     ],

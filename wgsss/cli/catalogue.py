@@ -27,7 +27,7 @@ def methods(args: Any) -> None:
     rows: list[list[str]] = []
     for kind, entries in result.items():
         for entry in entries:
-            note = " (a reference)" if kind == "references" else f" = {entry['pair']}" if entry["pair"] else ""
+            note = " (a reference)" if kind == "references" else f" (the pair {entry['pair']})" if entry["pair"] else ""
             rows.append([entry["name"], entry["source"] + note])
             for knob in entry["knobs"]:
                 rows.append(["", f"--set {knob['name']}={_word(knob['default'])}  {knob['help']}, {_values(knob)}"])
@@ -65,7 +65,14 @@ def _described(kinds: Any) -> list[dict[str, Any]]:
 def _knobs(kind: Any) -> list[dict[str, Any]]:
     from dataclasses import fields
 
-    return [{"name": knob.name, "default": knob.default, **knob.metadata} for knob in fields(kind)]
+    from wgsss.registry import pair_of, surfaces_for
+
+    knobs = [{"name": knob.name, "default": knob.default, **knob.metadata} for knob in fields(kind)]
+    surface, _, translucency = (pair_of(kind) or "").partition("+")
+    if surface and len(surfaces := surfaces_for(translucency)) > 1:
+        about = "surface method of the pair"
+        knobs.append({"name": "surface", "default": surface, "choices": surfaces, "help": about, "unit": ""})
+    return knobs
 
 
 def materials(args: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from typing import Any
 
@@ -59,16 +59,16 @@ def _is_allowed(knob: Field[Any], value: Any) -> bool:
     return bool(low <= value <= high)
 
 
-def parsed(name: str, kind: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+def parsed(name: str, kind: Any, values: Mapping[str, Any], others: Sequence[str] = ()) -> dict[str, Any]:
     """Return the values of knobs of the method `name`, each in the type of the knob's default.
 
-    Raises InputError for a knob that is not known, or a value that is not of the knob's type and range, or not one of
-    its choices.
+    Raises InputError for an unknown knob, naming the known ones and `others`, and for a value that is not of the knob's
+    type and range or not one of its choices.
     """
     knobs = {knob.name: knob for knob in fields(kind)}
     for knob in values:
         if knob not in knobs:
-            raise unknown(f"knob of {name}", knob, knobs)
+            raise unknown(f"knob of {name}", knob, [*knobs, *others])
     return {knob: _parsed(f"{name}: {knob}", knobs[knob], value) for knob, value in values.items()}
 
 
