@@ -16,6 +16,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError, Note
 from wgsss.scene.animation import Animation, choose_clip, first_of_equal, unfolded
 from wgsss.scene.blend import Blend
+from wgsss.scene.build_mesh import build_mesh, device_vertices
 from wgsss.scene.checks import Triple
 from wgsss.scene.files import read_file
 from wgsss.scene.files.contents import CameraView, LightSource, Look
@@ -26,7 +27,6 @@ from wgsss.scene.repair import counted, repair
 from wgsss.scene.rig import Rig
 from wgsss.scene.simplify import simplified
 from wgsss.scene.soup import Soup, joined, placed
-from wgsss.scene.surface import device_vertices, surface
 from wgsss.scene.textures import TextureReader, coordinates, first_texture, shared, usable_look
 
 Array = npt.NDArray[Any]
@@ -222,7 +222,7 @@ class _File:
         if notes:
             self.say(f"{_named(name)}{'; '.join(notes)}")
 
-        mesh = surface(soup, fixed, f"{self.path.stem} {name}".strip())
+        mesh = build_mesh(soup, fixed, f"{self.path.stem} {name}".strip())
         if 3 * len(faces) > MOST_VERTICES:  # as it may be where all corners differ
             self._check_count(len(faces), device_vertices(mesh))
         motion = None

@@ -20,7 +20,7 @@ Array = npt.NDArray[Any]
 OWN_NORMALS_SHARE, OWN_NORMALS_DEGREES = 1e-3, 20.0
 
 
-def surface(soup: Soup, fixed: Repaired, name: str) -> Mesh:
+def build_mesh(soup: Soup, fixed: Repaired, name: str) -> Mesh:
     """Build the mesh of the repaired faces of a soup. Normals of flipped faces are flipped too, to point outwards."""
 
     def corners(values: Array | None) -> Array | None:
