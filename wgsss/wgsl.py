@@ -2,9 +2,6 @@
 
 The WGSL text is the only declaration of these; Python repeats none of them.
 
-Imports follow a small subset of WESL: `import package::fresnel::{schlick};` includes the whole file
-`wgsl/fresnel.wgsl` once, before the text of the importing module, and checks that the file declares these names.
-
 Group 0 holds the bindings of the module that is compiled. Files that other modules import may own bindings too, in
 group 1 (`wgsl/lights.wgsl`, `wgsl/per_object.wgsl`). A pass binds only those that its entry points use, since that is
 all that a pipeline with an automatic layout has.
@@ -15,19 +12,19 @@ A render target's format is the type of the output, an alias (`@location(0) M_fr
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+
+from wgsss.wgsl_imports import WgslError, resolve, strip_comments
+from wgsss.wgsl_layout import Layout, padded_dtype, round_up
 
 _PACKAGE = Path(__file__).parent
 ROOT = _PACKAGE / "wgsl" if (_PACKAGE / "wgsl").is_dir() else _PACKAGE.parent / "wgsl"
 
-_IMPORT = re.compile(r"^\s*import\s+package((?:::\w+)+?)(?:::\{([^}]*)\}|::(\w+));[^\S\n]*$", re.M)
-_DECLARATION = re.compile(r"\b(?:fn|struct|alias|const|override|var)\s*(?:<[^>]*>)?\s*(\w+)")
 _BINDING = re.compile(
     r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var\s*(?:<\s*(\w+)\s*(?:,\s*(\w+)\s*)?>)?\s*(\w+)\s*:\s*([^;]+);"
 )
@@ -46,98 +43,6 @@ _WORKGROUP = re.compile(r"@workgroup_size\(([^)]*)\)")
 _RETURNS = re.compile(r"@fragment\s+fn\s+\w+\s*\([^{]*?->\s*(\w+)\s*\{", re.S)
 _SCALARS = {"f32": "<f4", "i32": "<i4", "u32": "<u4", "f16": "<f2"}
 _SHORT = {"f": "f32", "i": "i32", "u": "u32", "h": "f16"}
-
-
-class WgslError(Exception):
-    """An error in a module or in the values for its bindings; the message names the file and, where known, the line."""
-
-
-def _strip_comments(text: str) -> str:
-    """Return the text without comments, but with all newlines, so that line numbers stay the same."""
-    text = re.sub(r"/\*.*?\*/", lambda m: re.sub(r"[^\n]", " ", m.group()), text, flags=re.S)
-    return re.sub(r"//[^\n]*", "", text)
-
-
-def _round_up(value: int, multiple: int) -> int:
-    return -(-value // multiple) * multiple
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The memory layout of a host-shareable type (WGSL specification, section 14.4) and the matching numpy dtype."""
-
-    text: str
-    """the type as WGSL"""
-    size: int
-    """bytes; of an array of runtime size, those of one element"""
-    align: int
-    """bytes"""
-    dtype: np.dtype[Any]
-    fields: tuple[tuple[str, Layout, int], ...] = ()
-    """of a struct: name, layout and offset"""
-    element: Layout | None = None
-    """of an array"""
-    count: int | None = 0
-    """of an array's elements; None: of runtime size"""
-    columns: int = 0
-    """of a matrix"""
-
-    def pack(self, value: Any) -> bytes:
-        """Return `value` as bytes.
-
-        Args:
-            value: a number or array for a scalar, vector or matrix (rows, columns); a dict for a struct; a sequence for
-                an array; for an array of structs also a structured array or a dict of arrays.
-
-        Raises WgslError where names, shapes or counts do not match.
-        """
-        runtime_sized = self.element is not None and self.count is None
-        if runtime_sized and _length(value, self.text) == 0:
-            return bytes(self.size)  # a binding cannot be empty: one element of zeros
-        out = np.zeros(_length(value, self.text) if runtime_sized else (), self.dtype)
-        self._assign(out, value, self.text)
-        return out.tobytes()
-
-    def _assign(self, out: np.ndarray, value: Any, path: str) -> None:
-        """Write values into `out`, an array of this layout's dtype or a view of it."""
-        if self.fields:
-            value = _columns(value, path)
-            names = {name for name, _, _ in self.fields}
-            if set(value) != names:
-                raise WgslError(f"{path} has the fields {', '.join(sorted(names))}; got {', '.join(sorted(value))}")
-            for name, layout, _ in self.fields:
-                layout._assign(out[name], value[name], f"{path}.{name}")
-        elif self.element is not None:
-            padded = self.element.dtype.itemsize != _round_up(self.element.size, self.element.align)
-            self.element._assign(out["value"] if padded else out, value, path)
-        else:
-            values = np.asarray(value)
-            if self.columns:  # a mathematical (rows, columns) matrix is stored by columns
-                values = np.swapaxes(values, -1, -2) if values.ndim >= 2 else values
-                out = out[..., : int(self.text[5])]
-            if values.shape != out.shape:
-                raise WgslError(f"{path}: expected shape {out.shape} for {self.text}, got {values.shape}")
-            out[...] = values
-
-
-def _columns(value: Any, path: str) -> Mapping[str, Any]:
-    """Return the value of a struct, or of an array of structs, by field name."""
-    if isinstance(value, np.ndarray) and value.dtype.names:
-        return {name: value[name] for name in value.dtype.names}
-    if isinstance(value, Sequence) and value and isinstance(value[0], Mapping):
-        return {name: np.stack([np.asarray(v[name]) for v in value]) for name in value[0]}
-    if isinstance(value, Mapping):
-        return value
-    raise WgslError(f"{path}: expected a dict, got {type(value).__name__}")
-
-
-def _length(value: Any, path: str) -> int:
-    if not isinstance(value, Mapping):
-        return len(value)
-    lengths = {len(v) for v in value.values()}
-    if len(lengths) != 1:
-        raise WgslError(f"{path}: the fields differ in length: {sorted(lengths)}")
-    return lengths.pop()
 
 
 @dataclass(frozen=True)
@@ -173,7 +78,7 @@ class Module:
 
     @cached_property
     def _clean(self) -> str:
-        return _strip_comments(self.source)
+        return strip_comments(self.source)
 
     @cached_property
     def aliases(self) -> dict[str, str]:
@@ -322,9 +227,9 @@ class Module:
             return Layout(kind, dtype.itemsize, padded * scalar.itemsize, dtype, columns=columns)
         if match := re.fullmatch(r"array<(.+?)(?:,(\w+))?>", kind):
             element = self.layout(match[1])
-            stride = _round_up(element.size, element.align)
+            stride = round_up(element.size, element.align)
             count = self._integer(match[2], self.constants) if match[2] else None
-            dtype = _padded(element, stride)
+            dtype = padded_dtype(element, stride)
             if count is None:
                 return Layout(kind, stride, element.align, dtype, element=element, count=None)
             return Layout(
@@ -343,10 +248,10 @@ class Module:
                 own_align = int(match[1])
             if match := re.search(r"@size\((\d+)\)", attributes):
                 own_size = int(match[1])
-            offset = _round_up(offset, own_align)
+            offset = round_up(offset, own_align)
             fields.append((name, layout, offset))
             offset, align = offset + own_size, max(align, own_align)
-        size = _round_up(offset, align)
+        size = round_up(offset, align)
         names, formats, offsets = [f[0] for f in fields], [f[1].dtype for f in fields], [f[2] for f in fields]
         dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
         return Layout(kind, size, align, dtype, tuple(fields))
@@ -360,12 +265,6 @@ class Module:
             return f"{path}:{number}:{match.group(2)}"
 
         return re.sub(r"(?:wgsl)?:(\d+):(\d+)", place, message)
-
-
-def _padded(layout: Layout, stride: int) -> np.dtype[Any]:
-    if layout.dtype.itemsize == stride:
-        return layout.dtype
-    return np.dtype({"names": ["value"], "formats": [layout.dtype], "offsets": [0], "itemsize": stride})
 
 
 def _functions(clean: str) -> Iterator[tuple[str, str, str]]:
@@ -392,52 +291,13 @@ def _closing(clean: str, start: int, brackets: str) -> int:
     return len(clean)
 
 
-def _resolve(
-    name: str, root: Path, done: dict[str, str], chain: tuple[str, ...], asked_by: str
-) -> list[tuple[str, str, int]]:
-    """Return the lines of a module after those of the files that it imports: text, file and line number of each.
-
-    Args:
-        done: the texts of the files that are included already, by name; this adds to it.
-        chain: names of the modules whose imports led here.
-        asked_by: the file and line of the import, for errors.
-    """
-    if name in chain:
-        raise WgslError(f"{asked_by}: circular import {' -> '.join((*chain, name))}")
-    if name in done:
-        return []
-    path = root / f"{name}.wgsl"
-    if not path.is_file():
-        raise WgslError(f"{asked_by}: no module '{name}' ({name}.wgsl not found)")
-    text = path.read_text()
-    clean = _strip_comments(text)
-    out: list[tuple[str, str, int]] = []
-    for match in _IMPORT.finditer(clean):
-        parts = match.group(1).strip(":").split("::")
-        line = clean.count("\n", 0, match.end()) + 1
-        where = f"{name}.wgsl:{line}"
-        names = match.group(2) if match.group(2) is not None else match.group(3)
-        imported = [n.strip() for n in names.split(",") if n.strip()]
-        target = "/".join(parts)
-        out += _resolve(target, root, done, (*chain, name), where)
-        missing = [n for n in imported if n not in _DECLARATION.findall(done[target])]
-        if missing:
-            raise WgslError(f"{where}: {target}.wgsl does not declare {', '.join(missing)}")
-    done[name] = clean
-    lines = text.split("\n")
-    for match in _IMPORT.finditer(clean):
-        for i in range(clean.count("\n", 0, match.start()), clean.count("\n", 0, match.end()) + 1):
-            lines[i] = "" if "import" in lines[i] or not lines[i].strip() else lines[i]
-    return out + [(line, f"{name}.wgsl", i + 1) for i, line in enumerate(lines)]
-
-
 def load(name: str, root: Path = ROOT) -> Module:
     """Return the module `wgsl/<name>.wgsl` with its imports.
 
     Raises WgslError, with file and line, for a missing file, an unknown imported name or a circular import.
     """
     if (name, root) not in loaded:
-        lines = _resolve(name, root, {}, (), name)
+        lines = resolve(name, root, {}, (), name)
         text = "\n".join(line for line, _, _ in lines)
         loaded[name, root] = Module(name, text, tuple((path, n) for _, path, n in lines))
     return loaded[name, root]
@@ -445,3 +305,5 @@ def load(name: str, root: Path = ROOT) -> Module:
 
 loaded: dict[tuple[str, Path], Module] = {}
 """the modules read so far, by name and root; one that is removed is read again at its next use"""
+
+__all__ = ["ROOT", "Binding", "Layout", "Module", "WgslError", "load", "loaded"]
