@@ -150,6 +150,16 @@ def test_objects_hide_each_other_and_share_a_map_if_mesh_and_material_are_the_sa
     assert (passes.M_back[12, 17, :3] > 0).all()
 
 
+def test_M_back_stays_the_same_once_another_method_gives_the_body_an_atlas(gpu):
+    stage = Stage(gpu, lit(SIDE, mesh=ear(600), material=MARBLE, camera=replace(FRONT, eye=(0, 30, 250), height=80)))
+    before = Passes(stage).M_back
+    split = len(stage.bodies[0].render_mesh.vertex)
+    stage.bodies[0].unwrap()
+    assert len(stage.bodies[0].render_mesh.vertex) > split, "the atlas splits vertices"
+    np.testing.assert_allclose(Passes(stage).M_back, before, atol=1e-5)
+    assert before.max() > 0.01
+
+
 def test_a_scene_without_translucency_has_no_passes_for_it(gpu):
     stage = Stage(gpu, lit(SIDE, mesh=sphere(60.0, 200), material=MATERIALS["skin1"]))
     PLAIN.bake(stage)

@@ -98,10 +98,10 @@ class SamTranslucency:
         Bodies of one map share it. A body that deforms has its own, whose entries change from frame to frame.
         """
         sender_map, stage, mesh = self.sender_map(body), body.stage, body.rest.mesh
-        deforms = body.rest.motion is not None
+        deforms, render_mesh = body.rest.motion is not None, body.render_mesh  # another one once the body has an atlas
         return stage.shared(
-            ("sam upload", id(sender_map), body.index if deforms else None),
-            lambda: upload(stage.gpu, mesh, body.render_mesh.faces, sender_map, deforms=deforms),
+            ("sam upload", id(sender_map), id(render_mesh), body.index if deforms else None),
+            lambda: upload(stage.gpu, mesh, render_mesh.faces, sender_map, deforms=deforms),
         )
 
     def M_back_at_vertices(self, frame: Frame, body: Body, gpu_map: GpuSenderMap) -> Handle:
