@@ -24,6 +24,34 @@ STEEPEST = 100.0
 """Largest scale of the slopes of a normal map: beyond it all slopes are vertical."""
 
 
+MAX_LAYERS = 4
+"""Largest number of layers of a material whose layers have maps."""
+
+
+@dataclass(frozen=True, eq=False)
+class LayerMaps:
+    """Textures of one layer of a material, over the texture coordinates of a mesh, top row at v = 0.
+
+    Raises InputError for an array of another type or shape.
+    """
+
+    thickness: npt.NDArray[Any] | None = None
+    """uint8 or uint16 (H, W), linear: share of the thickness of the layer, which is reached at white; 0 where the layer
+    is absent. Without it the layer has its thickness everywhere"""
+    color: npt.NDArray[Any] | None = None
+    """uint8 (H, W, 3), sRGB: multiplies sigma_s (Norberg 2010, section 5.1)"""
+    opacity: npt.NDArray[Any] | None = None
+    """uint8 or uint16 (H, W), linear: share of the layer's scattering and absorption that is present"""
+
+    def __post_init__(self) -> None:
+        for name in ("thickness", "color", "opacity"):
+            pixels, types = getattr(self, name), (np.uint8,) if name == "color" else (np.uint8, np.uint16)
+            shape = (3,) if name == "color" else ()
+            if pixels is not None and (pixels.dtype not in types or pixels.size == 0 or pixels.shape[2:] != shape):
+                kinds = " or ".join(np.dtype(kind).name for kind in types)
+                raise InputError(f"the {name} map of a layer must be {kinds} of H x W{' x 3' if shape else ''}")
+
+
 @dataclass(frozen=True, eq=False)
 class Maps:
     """Textures over the texture coordinates of a mesh, top row at v = 0. None means no texture."""
@@ -40,6 +68,8 @@ class Maps:
     """whether textures are sampled without interpolation"""
     normal_scale: float = 1.0
     """scale of the slopes of the normal map"""
+    layers: tuple[LayerMaps, ...] = ()
+    """one for each layer of the material, from the top down; empty if no layer has maps"""
     tint: Triple = (1.0, 1.0, 1.0)
     """linear base colour of the material in the file; it also multiplies the base colour of a material that
     replaces it"""
