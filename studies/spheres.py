@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from wgsss.bake.photons import trace
 from wgsss.gpu import default_gpu
 from wgsss.reference.integral import integral
-from wgsss.reference.photons import trace
 from wgsss.reference.volume import Volume
 from wgsss.scene import DirectionalLight, EnvironmentLight, Object, OrthographicCamera, Scene, material, shapes
 from wgsss.stage import Stage

@@ -20,12 +20,12 @@ from unittest import mock
 import numpy as np
 from conftest import DATA
 
+from wgsss.bake.photons import trace
 from wgsss.frame import begin
 from wgsss.gpu import Gpu, default_gpu
 from wgsss.graph import Graph
 from wgsss.optics import Layer
 from wgsss.reference.integral import integral
-from wgsss.reference.photons import trace
 from wgsss.registry import METHODS, make_method, sweep_of
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene

@@ -37,6 +37,8 @@ KNOBS: dict[str, dict[str, Any]] = {
     "deon07": {"map_size": 256},
     "jimenez08": {"map_size": 256},
     "jensen02": {"spacing": 6.0},
+    "skin-patch jensen02": {"spacing": 0.5},  # mean free paths are long
+    "organ jensen02": {"spacing": 0.5},
     "crowd jensen02": {"spacing": 20.0},  # heads are large beside what skin scatters over
     "sam": {"surface": "screen"},
 }

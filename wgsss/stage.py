@@ -13,10 +13,12 @@ import numpy.typing as npt
 
 from wgsss import wgsl
 from wgsss.bake.environment import Prefiltered, SplitEnvironment, prefilter, split_environments
+from wgsss.bake.layer_profile import diffusion_profile
 from wgsss.bake.samples import Samples
 from wgsss.bake.sky import sky_visibility
 from wgsss.bake.unwrap import RenderMesh, split, unwrap
 from wgsss.gpu import Buffer, Gpu, Texture
+from wgsss.optics import Profile
 from wgsss.scene import EnvironmentLight, Material, Mesh, Object, Scene
 from wgsss.scene.light import Light
 from wgsss.scene.material import WRAPS
@@ -138,6 +140,12 @@ class Body:
     @property
     def material(self) -> Material:
         return self.rest.material
+
+    @property
+    def profile(self) -> Profile:
+        """The diffusion profile of the material, which photons measure for layers with maps that are too thin."""
+        material = self.material
+        return self.stage.shared(("profile", id(material)), lambda: diffusion_profile(self.stage.gpu, material))
 
     def unwrap(self) -> RenderMesh:
         """Give the body an atlas, which passes in texture space need. This takes a while the first time."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wgsss.bake.photons import trace
 from wgsss.optics import BetterDipole, Dipole, Layer, Layers, Multipole, Photons, Profile
-from wgsss.reference.photons import trace
 
 SKIN1 = ((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
 # Mikkelsen 2009, table 3, after Donner & Jensen 2006

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from tqdm import tqdm
 
+from wgsss.bake.photons import trace
 from wgsss.errors import InputError, RenderError
 from wgsss.optics import Layer
 from wgsss.reference import mitsuba_paths
@@ -22,7 +23,6 @@ from wgsss.reference.integral import integral
 from wgsss.reference.mitsuba_paths import Paths, newest_llvm
 from wgsss.reference.mitsuba_scene import export
 from wgsss.reference.mitsuba_xml import scene_xml
-from wgsss.reference.photons import trace
 from wgsss.reference.volume import Volume, _rays
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer

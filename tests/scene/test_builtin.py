@@ -11,7 +11,7 @@ from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, Re
 from wgsss.scene.scene import Scene
 
 SMALL = {"slab": 200, "sphere": 200, "ear": 1000, "milk": 5000, "gyroid": 2000, "statue": 5000, "leaf": 1000}
-SMALL |= {"wave": 300, "crowd": 1000}
+SMALL |= {"wave": 300, "crowd": 1000, "skin-patch": 300, "organ": 300}
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,8 @@ def scenes() -> dict[str, Scene]:
 
 
 def test_names_in_order_and_docstrings_of_one_line(scenes: dict[str, Scene]) -> None:
-    assert list(SCENES) == ["slab", "sphere", "ear", "milk", "gyroid", "statue", "leaf", "wave", "crowd"]
+    first = ["slab", "sphere", "ear", "milk", "gyroid", "statue", "leaf", "wave", "crowd"]
+    assert list(SCENES) == [*first, "skin-patch", "organ"]
     assert [scene.name for scene in scenes.values()] == list(SCENES)
     for build in SCENES.values():
         assert build.__doc__ and "\n" not in build.__doc__

@@ -28,5 +28,5 @@ class Lambert:
 def reflect(frame: Frame, irradiance: Handle, label: str = "") -> Handle:
     """Return M, W/m^2, where light leaves at the pixel at which it enters as `irradiance`."""
     return frame.per_object(
-        "lambert/reflect", lambda body: {"total": body.material.profile.total}, label=label, irradiance=irradiance
+        "lambert/reflect", lambda body: {"total": body.profile.total}, label=label, irradiance=irradiance
     )

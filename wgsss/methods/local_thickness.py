@@ -95,7 +95,7 @@ class LocalThickness:
     def map(self, body: Body) -> Array:
         """Return the thickness at the vertices, float32 (V, 3), as the paper stores it: 1 where a body is thin. Grey is
         the mean of the channels weighted by their total reflectance."""
-        mesh, profile = body.rest.mesh, body.material.profile
+        mesh, profile = body.rest.mesh, body.profile
         coloured = body.stage.shared(
             ("local thickness", id(mesh), id(body.material)), lambda: local_thickness(mesh, profile)
         )
@@ -186,5 +186,5 @@ class LocalThickness:
 
 def _albedo(body: Body) -> Array:
     """Return the printed cDiffuseAlbedo (3,), without the base colour's map."""
-    albedo: Array = body.material.profile.total * body.material.base_color
+    albedo: Array = body.profile.total * body.material.base_color
     return albedo

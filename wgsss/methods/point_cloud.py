@@ -76,7 +76,7 @@ class PointCloud:
 
     def kernel(self, body: Body) -> Kernel:
         """Return the table of the profile of a body's material for the spacing of its samples."""
-        cloud, mesh, profile = self.cloud(body), body.rest.mesh, body.material.profile
+        cloud, mesh, profile = self.cloud(body), body.rest.mesh, body.profile
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         key = ("kernel", id(body.material), cloud.spacing, size)
         return body.stage.shared(key, lambda: kernel(profile, NEAR * cloud.spacing, 2.0 * size))

@@ -77,8 +77,8 @@ class ScreenSpace:
         return body.stage.shared(("separable", id(body.material), self.kernel, taps), make)
 
     def _terms(self, body: Body) -> tuple[Term, ...]:
-        material = body.material
-        return body.stage.shared(("terms", id(material), self.kernel), lambda: KERNELS[self.kernel](material.profile))
+        key = ("terms", id(body.material), self.kernel)
+        return body.stage.shared(key, lambda: KERNELS[self.kernel](body.profile))
 
     def passes(self, frame: Frame) -> Diffused:
         return Diffused(frame.once(self, lambda: self.diffuse(frame, irradiance_pixels(frame))))
@@ -130,7 +130,7 @@ class ScreenSpace:
 def taps_for(frame: Frame, body: Body) -> int:
     """Return the number of taps per direction: at least as many to each side as the pixels within which half of the
     light leaves, but 32 at most."""
-    half = body.stage.shared(("half", id(body.material)), lambda: float(body.material.profile.range(0.5).max()))
+    half = body.stage.shared(("half", id(body.material)), lambda: float(body.profile.range(0.5).max()))
     posed = frame.stage.scene.objects[body.index]
     middle = posed.matrix @ np.array([*posed.mesh.bounds.mean(axis=0), 1.0])
     to_clip = frame.view.world_to_clip

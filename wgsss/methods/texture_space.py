@@ -74,7 +74,7 @@ class TextureSpace:
         is the profile itself where that is such a sum of at most `gaussians`, otherwise a fit."""
         return body.stage.shared(
             ("fit", id(body.material), self.gaussians),
-            lambda: fit_shared_gaussians(body.material.profile, self.gaussians),
+            lambda: fit_shared_gaussians(body.profile, self.gaussians),
         )
 
     def passes(self, frame: Frame) -> Diffused:

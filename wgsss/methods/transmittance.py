@@ -67,7 +67,7 @@ class Transmittance:
         """Return the lengths of a body's material, by the names of the shader's parameters, and a buffer with T."""
 
         def make() -> tuple[dict[str, float], Buffer]:
-            profile = body.material.profile
+            profile = body.profile
             thickness, through = table(profile)
             packed = wgsl.load("transmittance/transmit").layout("array<vec3f>").pack(through)
             lengths = {"reach": float(thickness[-1]), "shrink": float(profile.range(0.5).max())}

@@ -62,7 +62,7 @@ def integral(
         samples: largest number of samples of an object, but each face has at least four. Warns if M has not converged.
     """
     width, height = size
-    used = {body.index: (profiles or {}).get(body.index, body.material.profile) for body in stage.bodies}
+    used = {body.index: (profiles or {}).get(body.index, body.profile) for body in stage.bodies}
 
     def compute() -> Arrays:
         front, back, error = np.zeros((3, height, width, 3), np.float32)
@@ -102,7 +102,7 @@ def at_vertices(
     normals or texture coordinates split a vertex, it is taken as part of one of its sides. Arguments and warnings are
     those of `integral`.
     """
-    profile = profile or body.material.profile
+    profile = profile or body.profile
 
     def compute() -> Arrays:
         used = np.unique(body.mesh.faces)

@@ -12,6 +12,7 @@ from wgsss.errors import InputError
 from wgsss.scene import shapes
 from wgsss.scene.camera import PerspectiveCamera
 from wgsss.scene.defaults import framing
+from wgsss.scene.layerscenes import organ_material, skin_material
 from wgsss.scene.light import DirectionalLight, EnvironmentLight, PointLight, RectLight, SphereLight
 from wgsss.scene.material import Material, material
 from wgsss.scene.motion import BendAndSwell
@@ -119,6 +120,24 @@ def crowd(vertices: int | None = None, copies: int = 4) -> Scene:
     return Scene("crowd", tuple(heads), (key, rim, room), _framed(heads, azimuth=10, elevation=12))
 
 
+def skin_patch(vertices: int | None = None) -> Scene:
+    """a curved patch of thin skin over veins of two depths, in layers"""
+    plate = Object(shapes.patch(vertices=vertices), skin_material())
+    key = DirectionalLight(direction=(0.55, -0.5, -0.75), irradiance=(5.2, 5.0, 4.8))
+    back = DirectionalLight(direction=(-0.5, -0.3, 0.8), irradiance=(1.2, 1.3, 1.5))
+    room = EnvironmentLight((0.12, 0.12, 0.13))
+    return Scene("skin-patch", (plate,), (key, back, room), _framed([plate], azimuth=14, elevation=18))
+
+
+def organ(vertices: int | None = None) -> Scene:
+    """blobs of fat over veins on a soft body that sways and swells over time, in layers"""
+    body = Object(shapes.organ(vertices), organ_material(), motion=BendAndSwell(bend=40.0, swell=0.2))
+    key = DirectionalLight(direction=(0.5, -0.5, -0.7), irradiance=(5.4, 5.2, 5.0))
+    back = DirectionalLight(direction=(-0.7, -0.2, 0.6), irradiance=(2.0, 2.1, 2.4))
+    room = EnvironmentLight((0.12, 0.12, 0.13))
+    return Scene("organ", (body,), (key, back, room), _framed([body], azimuth=0, elevation=8))
+
+
 SCENES: dict[str, Callable[[int | None], Scene]] = {
     "slab": slab,
     "sphere": sphere,
@@ -129,5 +148,7 @@ SCENES: dict[str, Callable[[int | None], Scene]] = {
     "leaf": leaf,
     "wave": wave,
     "crowd": crowd,
+    "skin-patch": skin_patch,
+    "organ": organ,
 }
 """Each scene by its name, as a function of the vertex count (None: the shape's default)."""

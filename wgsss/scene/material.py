@@ -15,6 +15,9 @@ from wgsss.optics import SKIN_GAUSSIANS, Dipole, Layer, Layers, Profile, SumOfGa
 from wgsss.optics.medium import DENSEST, THINNEST, coefficients, stack
 from wgsss.scene import checks
 from wgsss.scene.checks import Triple
+from wgsss.scene.layermaps import MAX_LAYERS as MAX_LAYERS
+from wgsss.scene.layermaps import LayerMaps as LayerMaps
+from wgsss.scene.layermaps import check_layer_maps, mean_stack
 from wgsss.text import shortened
 
 WRAPS = ("repeat", "clamp", "mirror")  # in the order of wgsl/mesh.wgsl
@@ -22,34 +25,6 @@ SLOTS = ("base_color", "normal", "specular")
 """Kinds of textures."""
 STEEPEST = 100.0
 """Largest scale of the slopes of a normal map: beyond it all slopes are vertical."""
-
-
-MAX_LAYERS = 4
-"""Largest number of layers of a material whose layers have maps."""
-
-
-@dataclass(frozen=True, eq=False)
-class LayerMaps:
-    """Textures of one layer of a material, over the texture coordinates of a mesh, top row at v = 0.
-
-    Raises InputError for an array of another type or shape.
-    """
-
-    thickness: npt.NDArray[Any] | None = None
-    """uint8 or uint16 (H, W), linear: share of the thickness of the layer, which is reached at white; 0 where the layer
-    is absent. Without it the layer has its thickness everywhere"""
-    color: npt.NDArray[Any] | None = None
-    """uint8 (H, W, 3), sRGB: multiplies sigma_s (Norberg 2010, section 5.1)"""
-    opacity: npt.NDArray[Any] | None = None
-    """uint8 or uint16 (H, W), linear: share of the layer's scattering and absorption that is present"""
-
-    def __post_init__(self) -> None:
-        for name in ("thickness", "color", "opacity"):
-            pixels, types = getattr(self, name), (np.uint8,) if name == "color" else (np.uint8, np.uint16)
-            shape = (3,) if name == "color" else ()
-            if pixels is not None and (pixels.dtype not in types or pixels.size == 0 or pixels.shape[2:] != shape):
-                kinds = " or ".join(np.dtype(kind).name for kind in types)
-                raise InputError(f"the {name} map of a layer must be {kinds} of H x W{' x 3' if shape else ''}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +123,8 @@ class Material:
         if self.layers is not None:
             object.__setattr__(self, "layers", stack(self.layers))
             object.__setattr__(self, "eta", self.layers[0].eta)
-        elif self.gaussians is None and self.table is None:
+        check_layer_maps(self.layers, self.maps.layers)
+        if not any(getattr(self, name) is not None for name in IN_PLACE):
             if self.sigma_a is None or self.sigma_s_prime is None:
                 missing = "sigma_a" if self.sigma_a is None else "sigma_s_prime"
                 raise InputError(
@@ -166,8 +142,16 @@ class Material:
         return (Layer(np.asarray(self.sigma_a), np.asarray(self.sigma_s_prime), self.eta),)
 
     @cached_property
+    def mean_layers(self) -> tuple[Layer, ...] | None:
+        """The layers; where they have maps, those of mean thickness, mean colour and mean opacity."""
+        if self.layers is None or not self.maps.layers:
+            return self.layers
+        return mean_stack(self.layers, self.maps.layers)
+
+    @cached_property
     def profile(self) -> Profile:
-        """The diffusion profile R(r), 1/mm^2 per channel. A homogeneous medium has that of the dipole.
+        """The diffusion profile R(r), 1/mm^2 per channel. A homogeneous medium has that of the dipole, and layers with
+        maps that of their means.
 
         Raises InputError for layers too thin for diffusion theory. Photons can be traced through those too.
         """
@@ -175,9 +159,9 @@ class Material:
             return self.gaussians
         if self.table is not None:
             return self.table
-        if self.layers is not None:
+        if self.mean_layers is not None:
             try:
-                return Layers(self.layers)
+                return Layers(self.mean_layers)
             except InputError as error:
                 raise InputError(f"material '{self.name}': {error}") from None
         assert self.sigma_a is not None and self.sigma_s_prime is not None

@@ -11,12 +11,14 @@ from typing import Any
 from wgsss.errors import InputError
 from wgsss.optics import Dipole, Layer, SumOfGaussians, Tabulated
 from wgsss.scene import tables
-from wgsss.scene.images import read_map
+from wgsss.scene.images import read_levels, read_map
+from wgsss.scene.layermaps import LayerMaps
 from wgsss.scene.material import IN_PLACE, MATERIALS, SLOTS, Maps, Material, material
 from wgsss.text import shown
 from wgsss.userfiles import path_from
 
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
+_LAYER_MAPS = ("thickness_map", "color_map", "opacity_map")
 _INVERTED = ("reflectance", "mean_free_path", "diffuse_mean_free_path")
 """Keys from which the coefficients are computed by inverting the dipole."""
 
@@ -34,10 +36,13 @@ class Chosen:
 
         A colour that varies over the mesh, by a texture or by vertex colours, becomes the base colour and replaces the
         constant base colour of the material. If the user chose that colour, it tints the varying one instead. A
-        constant colour of the mesh (`Maps.tint`) also becomes the base colour, unless the material has its own.
+        constant colour of the mesh (`Maps.tint`) also becomes the base colour, unless the material has its own. The
+        maps of layers are always those of the material.
         """
         own = self.material.maps
-        both = replace(maps, **{slot: getattr(own, slot) for slot in SLOTS if getattr(own, slot) is not None})
+        both = replace(
+            maps, layers=own.layers, **{slot: getattr(own, slot) for slot in SLOTS if getattr(own, slot) is not None}
+        )
         if own.base_color is not None:
             both = replace(both, tint=(1.0, 1.0, 1.0))
         constant, varies = self.material.base_color, both.base_color is not None or coloured_vertices
@@ -94,7 +99,10 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
     if "layers" in table:
         if "eta" in table:
             raise InputError(f"{where}: eta is that of the first of the layers: give it there")
-        values["layers"] = [tables.call(Layer, layer, at) for layer, at in tables.each(table, "layers", where)]
+        pairs = [_layer(layer, at, folder) for layer, at in tables.each(table, "layers", where)]
+        values["layers"] = [layer for layer, _ in pairs]
+        if not all(maps.empty for _, maps in pairs):
+            values["maps"] = Maps(layers=tuple(maps for _, maps in pairs))
     if "table" in table:
         values["table"] = Tabulated.read(tables.file_in(table, "table", where, folder))
 
@@ -108,6 +116,20 @@ def _from_table(table: tables.Table, folder: Path, where: str, name: str) -> Cho
         )
     chosen = Chosen(tables.call(Material, values, where), coloured="base_color" in table)
     return replace(chosen, material=chosen.on(Maps(**images)))
+
+
+def _layer(table: tables.Table, where: str, folder: Path) -> tuple[Layer, LayerMaps]:
+    """Create one of the [[layers]] and its maps, whose files are relative to `folder`."""
+    tables.check_keys(table, [*inspect.signature(Layer).parameters, *_LAYER_MAPS], where)
+    images = {}
+    for key in [key for key in _LAYER_MAPS if key in table]:
+        values: tables.Table = {"source": tables.file_in(table, key, where, folder)}
+        if key == "color_map":
+            values["mode"] = "RGB"
+        read = read_map if key == "color_map" else read_levels
+        images[key.removesuffix("_map")] = tables.call(read, values, f"{where}: {key}")
+    layer = tables.call(Layer, {key: value for key, value in table.items() if key not in _LAYER_MAPS}, where)
+    return layer, LayerMaps(**images)
 
 
 def _inverted(table: tables.Table, eta: Any, where: str) -> tables.Table:

@@ -53,6 +53,11 @@ class Object:
     def __post_init__(self) -> None:
         checks.position(self, "translate")
         checks.triple(self, "rotate", -checks.ANGLE, checks.ANGLE, "degrees")
+        if self.material.maps.layers and self.mesh.corner_uvs is None:
+            raise InputError(
+                f"{self.mesh.name}: the mesh has no texture coordinates, which the maps of the layers of material "
+                f"'{self.material.name}' need"
+            )
 
     @cached_property
     def matrix(self) -> npt.NDArray[np.float64]:

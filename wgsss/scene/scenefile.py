@@ -8,7 +8,8 @@ The top level has the keys `name`, `exposure`, `tone_map` and `bloom`.
   `shapes`, with its arguments. A `mesh` may be followed by `mm_per_unit` or `size_mm`, by the `animation` of a glTF
   file, and by `simplify`, the largest number of faces. Each material of the file becomes an object.
 - `material` is a name, a material file, or a table `[object.material]`. The table or file has the fields of Material.
-  It may start from a `preset`, and names images as `base_color_map`, `normal_map` and `specular_map`.
+  It may start from a `preset`, and names images as `base_color_map`, `normal_map` and `specular_map`. Each of its
+  `[[layers]]` may name images as `thickness_map`, `color_map` and `opacity_map`.
 - `[object.motion]` has a `kind`, which is a class of `motion` in snake case, and its fields.
 
 Paths are relative to the file that contains them. Missing lights and a missing camera have the defaults of a mesh file.

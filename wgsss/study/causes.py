@@ -114,7 +114,7 @@ def photon_profiles(scene: Scene) -> dict[int, Profile]:
 
     Raises InputError if a material is known by its profile only.
     """
-    from wgsss.reference.photons import trace
+    from wgsss.bake.photons import trace
 
     traced: dict[int, Profile] = {}
     for item in scene.objects:

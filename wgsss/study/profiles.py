@@ -91,7 +91,7 @@ def _table(case: Case) -> Profile:
 
 
 def _photons(case: Case) -> Profile:
-    from wgsss.reference.photons import trace
+    from wgsss.bake.photons import trace
 
     return trace(case.stack, case.photons, label=f"photons in {case.material.name}")
 

@@ -112,7 +112,7 @@ def _scale(body: Body, gpu_map: GpuSenderMap) -> Array:
     Returns:
         float32 (V, 4): the ratio in each channel; the last column is 1.
     """
-    gpu, mesh, profile, state = body.stage.gpu, body.rest.mesh, body.material.profile, rest_state(body, gpu_map)
+    gpu, mesh, profile, state = body.stage.gpu, body.rest.mesh, body.profile, rest_state(body, gpu_map)
     V = len(mesh.positions)
 
     def make() -> Arrays:

@@ -83,7 +83,7 @@ class SamTranslucency:
 
     def sender_map(self, body: Body) -> SenderMap:
         """Return the Spatial Adjacency Map of a body at rest. Bodies of equal mesh and material share it."""
-        mesh, stage, profile = body.rest.mesh, body.stage, body.material.profile
+        mesh, stage, profile = body.rest.mesh, body.stage, body.profile
         key = ("sam", id(mesh), id(body.material))
         if self.select == "fit" and body.rest.motion is not None:  # `barnes_hut` reads no entries
             return stage.shared(key, lambda: full_sender_tree(stage.gpu, mesh, profile))

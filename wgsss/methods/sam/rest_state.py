@@ -49,7 +49,7 @@ def rest_state(body: Body, gpu_map: GpuSenderMap) -> RestState:
         layout = wgsl.load("sam/fans").layout("array<Cluster>")
         starts, corners = _fan_corners(mesh, gpu_map.sender_map)
         diagonal = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
-        low, steps, table = log_table(body.material.profile, _NEAREST * diagonal, _FARTHEST * diagonal, _TABLE)
+        low, steps, table = log_table(body.profile, _NEAREST * diagonal, _FARTHEST * diagonal, _TABLE)
         return RestState(
             gpu.buffer(layout.pack(clusters_at_rest(mesh, gpu_map.sender_map))),
             gpu.buffer(starts.astype(np.uint32)),

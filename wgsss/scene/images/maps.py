@@ -1,4 +1,4 @@
-"""Reader of textures with 8 bits per channel, the format that the passes use."""
+"""Readers of textures: with 8 bits per channel, and grey levels at the depth of the file."""
 
 from __future__ import annotations
 
@@ -38,6 +38,17 @@ def read_map(source: str | Path | bytes, mode: str, *, linear: bool = False) -> 
             colours = pixels.shape[2] - (pixels.shape[2] in (2, 4))
             pixels[..., :colours] = _srgb(pixels[..., :colours])
     return _eight_bits(_channels(pixels, mode))
+
+
+def read_levels(source: str | Path | bytes) -> npt.NDArray[Any]:
+    """Read a map of linear grey levels (H, W): uint8 from an image of 8 bits, uint16 from one of more.
+
+    Values outside 0 to 1 are clamped, with a warning. Errors are those of `read_map`.
+    """
+    pixels = read_pixels(source)
+    if pixels.dtype == np.float32:
+        pixels = np.round(_finite(pixels, message_prefix(source)) * 65535.0).astype(np.uint16)
+    return np.ascontiguousarray(_channels(pixels, "L"))
 
 
 def _finite(pixels: Array, prefix: str) -> Array:

@@ -11,8 +11,10 @@ from wgsss.scene.shapes._gyroid import gyroid
 from wgsss.scene.shapes._head import head
 from wgsss.scene.shapes._leaf import leaf
 from wgsss.scene.shapes._milk import milk
+from wgsss.scene.shapes._organ import organ
+from wgsss.scene.shapes._patch import patch
 from wgsss.scene.shapes._slab import slab
 from wgsss.scene.shapes._sphere import sphere
 from wgsss.scene.shapes._statue import statue
 
-__all__ = ["capsule", "ear", "gyroid", "head", "leaf", "milk", "slab", "sphere", "statue"]
+__all__ = ["capsule", "ear", "gyroid", "head", "leaf", "milk", "organ", "patch", "slab", "sphere", "statue"]

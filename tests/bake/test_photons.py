@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, trapezoid
 
+from wgsss.bake.photons import trace
 from wgsss.errors import InputError
 from wgsss.optics import Dipole, Layer, Photons, Profile
-from wgsss.reference.photons import trace
 
 SLAB = Layer((1, 1, 1), (2.25, 2.25, 2.25), 1.0, thickness=0.2, g=0.75)
 SKIN = Layer((0.032, 0.17, 0.48), (0.74, 0.88, 1.01), 1.3)
@@ -237,7 +237,7 @@ def test_energy_is_conserved(slab, skin):
 def test_results_are_reproducible(gpu, monkeypatch):
     first = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
     monkeypatch.setattr(gpu, "is_cpu", not gpu.is_cpu)  # changes the number of lanes and the order of execution
-    monkeypatch.setattr("wgsss.reference.photons._ROUND", 10)  # batches: seven rounds instead of one
+    monkeypatch.setattr("wgsss.bake.photons._ROUND", 10)  # batches: seven rounds instead of one
     again = trace([SLAB, SLAB], 3_000, seed=7, gpu=gpu)
     other = trace([SLAB, SLAB], 3_000, seed=8, gpu=gpu)
     for name in ("R", "T", "R_error", "total_error", "absorbed"):
