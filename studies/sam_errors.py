@@ -57,7 +57,7 @@ class Errors:
         """Compute the relative RMSE of the sum, which takes L_d as constant over a fan, against the integral."""
         places = replace(self.vertices, **{name: v[self.chosen] for name, v in vars(self.vertices).items()})
         bodies = [stage.bodies[0] for stage in self.stages]
-        integrals = [converged(b, places, b.material.profile, 0.05, 1_000_000).back for b in bodies]
+        integrals = [converged(b, places, b.profile, 0.05, 1_000_000).back for b in bodies]
         return self._relative(self.truth, integrals)
 
     def _relative(self, estimates: Sequence[np.ndarray], truth: Sequence[np.ndarray]) -> tuple[float, float]:
@@ -74,7 +74,7 @@ def sums(body: Body, L_d: Sequence[np.ndarray], receivers: np.ndarray) -> np.nda
     Form factors are those of Maisch & Ropinski 2017, eq. 11, back sides those of eq. 13 and 14.
     """
     x, n = body.mesh.positions.astype(np.float64), body.mesh.normals.astype(np.float64)
-    factors = FormFactors(body.stage.gpu, body.mesh, body.material.profile)
+    factors = FormFactors(body.stage.gpu, body.mesh, body.profile)
     light = np.stack(L_d).astype(np.float64)
     totals = np.zeros((len(light), len(receivers), 3))
     at_once = max(PAIRS // len(x), 1)

@@ -26,6 +26,7 @@ methods += [("jensen02", {"spacing": 3.0}), *(("sam", {"select": select}) for se
 for name, knobs in methods:
     Renderer(ear, make_method(name, knobs), (16, 16))
 Renderer(wave, make_method("sam"), (16, 16)).frame(0.5)
+Renderer(load_scene("organ", vertices=300), make_method("lambert"), (16, 16)).frame(0.0)
 make_method("integral", {"samples": 5000}).estimate(Stage(default_gpu(), ear), (8, 8))
 """
 

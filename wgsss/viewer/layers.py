@@ -37,7 +37,7 @@ def _stretch_colours(body: Body) -> Array:
 
 def _thickness_colours(body: Body) -> Array:
     """Return a linear RGB colour (R, 3) for each render vertex: white where the object is thin."""
-    return local_thickness(body.rest.mesh, body.material.profile)[body.render_mesh.vertex]
+    return local_thickness(body.rest.mesh, body.profile)[body.render_mesh.vertex]
 
 
 _VERTEX_COLOURS: dict[str, Callable[[Body], Array]] = {"UV stretch": _stretch_colours, "thickness": _thickness_colours}

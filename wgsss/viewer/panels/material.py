@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from wgsss.bake.layer_profile import diffusion_profile
+from wgsss.gpu import Gpu
+from wgsss.optics import Profile
 from wgsss.scene import MATERIALS, Material
 from wgsss.scene.tables import Table
 from wgsss.viewer.panels.widgets import LOGARITHMIC, choice, rounded
@@ -28,7 +32,7 @@ def declare_material(session: Session) -> None:
     chosen = choice("preset", material.name, MATERIALS)
     if chosen != material.name:
         session.attempt(lambda: session.set_material(chosen))
-    _declare_profile(material)
+    _declare_profile(_profile(session.painter.gpu, material))
     if material.sigma_a is not None and material.sigma_s_prime is not None:
         changes = _declare_coefficients(material)
         changed, roughness = imgui.slider_float("roughness", material.roughness, 0.05, 1.0, "%.2f")
@@ -60,10 +64,16 @@ def changed_table(material: Material, changes: dict[str, Any]) -> Table:
     return {"name": "custom", **plain, **changes}
 
 
-def _declare_profile(material: Material) -> None:
+@lru_cache(maxsize=1)
+def _profile(gpu: Gpu, material: Material) -> Profile:
+    """Return the profile of a material. It is not computed again for each frame."""
+    return diffusion_profile(gpu, material)
+
+
+def _declare_profile(profile: Profile) -> None:
     """Declare a plot of R_d over the distance r, with a curve for each channel."""
     r = np.geomspace(0.01, MAX_DISTANCE, 96)
-    curves = np.maximum(material.profile.reflectance(r), 1e-12)
+    curves = np.maximum(profile.reflectance(r), 1e-12)
     top = int(np.ceil(np.log10(curves.max())))
     if implot.begin_plot("##profile", (-1, 150), implot.Flags_.no_legend | implot.Flags_.no_inputs):
         implot.setup_axes("r, mm", "R_d, 1/mm²")
