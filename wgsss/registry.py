@@ -21,6 +21,7 @@ from wgsss.methods.pair import Pair, Translucency, pair
 from wgsss.methods.point_cloud import PointCloud
 from wgsss.methods.sam.method import SamTranslucency
 from wgsss.methods.screen_space import ScreenSpace
+from wgsss.methods.subsurface_texture_mapping import SubsurfaceTextureMapping
 from wgsss.methods.texture_space import TextureSpace
 from wgsss.methods.translucent_shadow_maps import TranslucentShadowMaps
 from wgsss.methods.transmittance import Transmittance
@@ -70,6 +71,7 @@ ROWS = (
     Row("barre11", pair(Lambert, LocalThickness), place=6),
     Row("jensen02", PointCloud, place=3),
     Row("sam", pair(TextureSpace, SamTranslucency), place=2, sweep=_SAM_SWEEP),
+    Row("francois06", SubsurfaceTextureMapping, place=7),
 )
 
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
