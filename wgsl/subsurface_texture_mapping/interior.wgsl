@@ -5,6 +5,9 @@ import package::units::{Number, Direction};
 // The direction inside, away from the surface and towards the light, of light from the direction w (Snell). Where w is
 // below the horizon, the light enters elsewhere, at a point that faces it more: the direction tends to w itself.
 fn refracted(w: Direction, n: Direction, eta: Number) -> Direction {
+    if eta == 1.0 {
+        return w;
+    }
     let cosine = dot(w, n);
     var along = w - n * cosine;
     if cosine <= 0.0 {

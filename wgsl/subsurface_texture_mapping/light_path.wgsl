@@ -22,6 +22,7 @@ override SHADOW: bool = true;     // whether shadow maps give the distance from 
 override REFRACTION: bool = true;
 
 const UNREACHED: Length = 1e9;
+const LEAST_COSINE: Number = 1e-3; // light enters where the surface faces it, if only just
 
 // Light from one direction.
 struct Ray {
@@ -98,24 +99,22 @@ fn marched(object: ObjectUniforms, shell: Shell, entry: vec3f, m: vec3f, at: vec
 fn arrival(object: ObjectUniforms, ray: Ray, shell: Shell, m: vec3f, below: Length, at: vec3f, c: Coefficients) -> Arrival {
     let straight = distance_along(shell, m, ray.inside);
     var distance = select(straight, UNREACHED, straight < 0.0);
-    var cosine = max(dot(ray.outside, normal_near(shell, m + ray.inside * max(straight, 0.0))), 0.0);
+    var cosine = max(dot(ray.outside, normal_near(shell, m + ray.inside * max(straight, 0.0))), LEAST_COSINE);
     if SHADOW && !ray.sky {
         let guess = max(straight, 0.0);
         let hit = first_hit(ray.light, ray.at, ray.origin + ray.to_world * (m + ray.inside * guess));
         if hit.known {
             let n = normal_near(shell, m + ray.inside * guess);
+            let off = smoothstep(0.1, 0.5, abs(hit.ahead) / (abs(hit.ahead) + guess + ray.near));
             let bend = clamp(dot(ray.outside, n) / max(dot(ray.inside, n), 1e-3), 0.1, 1.0);
-            distance = max(guess + hit.ahead * bend, 0.0);
-            let off = abs(hit.ahead) / (abs(hit.ahead) + guess + ray.near);
-            cosine = mix(cosine, hit.cosine, smoothstep(0.1, 0.5, off));
+            distance = max(guess + hit.ahead * mix(bend, 1.0, max(off, smoothstep(0.1, 0.0, dot(ray.outside, n)))), 0.0);
+            cosine = mix(cosine, hit.cosine, off);
         }
     }
     var entering = ray.at.irradiance;
     if REFRACTION && !ray.sky {
         let share = rho_dt(rho_dt_table, cosine, ray.specular);
-        entering *= share * cosine / max(refracted_cosine(cosine, ray.eta), 1e-4);
-    } else if !ray.sky {
-        entering *= select(0.0, 1.0, cosine > 0.0);
+        entering *= share * cosine / refracted_cosine(cosine, ray.eta);
     }
     var arriving = Arrival(distance, at, entering, vec3f(0.0));
     if distance < UNREACHED {

@@ -24,6 +24,7 @@ const PRINTED: u32 = 2u;
 const WHITE: u32 = 1u;
 const UV: u32 = 2u;
 const UV_NOISE: Length = 0.25; // greatest offset along the surface
+const OPAQUE: Number = 60.0;   // no optical depth is larger: exp(OPAQUE) is a finite number still
 const LONGEST: Number = 8.0;   // optical depth at which the ray ends, at most
 
 override STEPS: u32 = 10u;
@@ -117,8 +118,8 @@ fn optical_depth_between(k: array<vec3f, 4>, a: Node, b: Node, share: Number) ->
     let at = mix(a.at, b.at, share);
     let top = mix(a.light.top, b.light.top, share);
     let extra = mix(a.light.extra, b.light.extra, share);
-    let by_mean = optical_depth(k, distance, mix(a.below, b.below, share), at, top);
-    return select(max(by_mean + extra, vec3f(0.0)), by_mean + extra, vec3<bool>(LIGHT == EQ_20));
+    let least = select(0.0, -OPAQUE, LIGHT == EQ_20);
+    return clamp(optical_depth(k, distance, mix(a.below, b.below, share), at, top) + extra, vec3f(least), vec3f(OPAQUE));
 }
 
 // Where the ray crosses the interfaces between two nodes, in order: shares of the way, 1 for interfaces that it does not

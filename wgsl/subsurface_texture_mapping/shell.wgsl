@@ -31,8 +31,12 @@ fn depth_below(shell: Shell, m: vec3f) -> Length {
 
 // An angle's tangent x over 1 - k z as an arc length.
 fn arc(k: Number, x: Length, z: Length) -> Length {
-    let below = 1.0 - k * z;
-    return select(atan2(k * x, below) / k, x / below, abs(k * x) < 1e-4 * abs(below));
+    let rest = 1.0 - k * z;
+    let below = select(rest, 1e-6, abs(rest) < 1e-6);
+    if abs(k * x) < 1e-4 * below {
+        return x / below;
+    }
+    return atan2(k * x, below) / k;
 }
 
 // The texture coordinates of the point of the surface above m.
@@ -45,9 +49,15 @@ fn uv_above(shell: Shell, m: vec3f) -> vec2f {
 fn distance_along(shell: Shell, m: vec3f, d: vec3f) -> Length {
     let a = max(quadric(shell, m), 0.0);
     let b = dot(shell.k * m, d) - d.z;
-    let root = b * b + dot(shell.k * d, d) * a;
-    let below = b + sqrt(max(root, 0.0));
-    return select(a / below, -1.0, root < 0.0 || below < 1e-5);
+    let q = dot(shell.k * d, d);
+    let root = b * b + q * a;
+    if root < 0.0 || (b <= 0.0 && q <= 0.0) {
+        return -1.0;
+    }
+    if b > 0.0 {
+        return a / (b + sqrt(root));
+    }
+    return (sqrt(root) - b) / q;
 }
 
 // The normal of the surface near m.
