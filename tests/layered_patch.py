@@ -19,7 +19,11 @@ Array = npt.NDArray[Any]
 SIDE = 40.0  # mm, of the patch
 TEXELS = 512  # of the maps
 SCALE = 0.98 / SIDE  # of texture coordinates, 1/mm: those of scenes.plane
-COEFFICIENTS = (((0.1, 0.1, 0.2), (0.7, 0.6, 0.5)), ((1.2, 1.6, 2.0), (0.8, 0.4, 0.4)), ((0.3, 0.3, 0.4), (0.9, 0.9, 0.8)))
+COEFFICIENTS = (
+    ((0.1, 0.1, 0.2), (0.7, 0.6, 0.5)),
+    ((1.2, 1.6, 2.0), (0.8, 0.4, 0.4)),
+    ((0.3, 0.3, 0.4), (0.9, 0.9, 0.8)),
+)
 """sigma_a and sigma_s of the layers, 1/mm"""
 MEAN_COSINES = (0.0, 0.3, 0.0)
 KINDS = ("flat", "gentle", "blobs", "veins")
@@ -63,7 +67,9 @@ def material(kind: str, eta: float = 1.0, **fields: Any) -> Material:
 def patch(kind: str, light: float, view: float = 30.0, eta: float = 1.0) -> Scene:
     """Return a scene of a patch, lit and seen at angles from its normal, degrees, in one plane and from one side."""
     a, b = np.radians(light), np.radians(view)
-    camera = OrthographicCamera((50 * np.sin(b), 50 * np.cos(b), 0), (0, 0, 0), up=(0, 0, -1), height=10 if view < 70 else 4)
+    camera = OrthographicCamera(
+        (50 * np.sin(b), 50 * np.cos(b), 0), (0, 0, 0), up=(0, 0, -1), height=10 if view < 70 else 4
+    )
     sun = DirectionalLight((-np.sin(a), -np.cos(a), 0), (1, 1, 1))
     return lit(sun, mesh=plane(SIDE), material=material(kind, eta), camera=camera)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,9 +69,11 @@ def _mean_extinction(layers: tuple[Layer, ...], depths: Array) -> Array:
     sigma_t = np.stack([layer.sigma_s + layer.sigma_a for layer in layers])
     mean = np.diff(depths.mean(axis=(0, 1)), prepend=0.0)
     if not mean.sum() > 0.0:
-        return sigma_t[-1]
+        last: Array = sigma_t[-1]
+        return last
     weights = np.append(mean, 0.5 * mean.sum())  # the last layer has no end: what is seen of it counts as much
-    return weights @ sigma_t / weights.sum()
+    extinction: Array = weights @ sigma_t / weights.sum()
+    return extinction
 
 
 def interface_depths(layers: tuple[Layer, ...], maps: Maps) -> Array:
@@ -107,7 +109,7 @@ def _per_layer(layers: tuple[Layer, ...], maps: Maps) -> tuple[LayerMaps, ...]:
     return maps.layers or (LayerMaps(),) * len(layers)
 
 
-def _size(images: list[Array | None]) -> tuple[int, int]:
+def _size(images: Sequence[Array | None]) -> tuple[int, int]:
     """Return the height and width that hold all of some images; 1 x 1 if there are none."""
     sizes = [image.shape[:2] for image in images if image is not None]
     return max((h for h, _ in sizes), default=1), max((w for _, w in sizes), default=1)
@@ -133,9 +135,10 @@ def _resized(image: Array, size: tuple[int, int], maps: Maps) -> Array:
         if maps.nearest:
             image = np.take(image, np.clip(np.round(at), 0, old - 1).astype(int), axis=axis)
             continue
-        mode = "wrap" if maps.wrap[1 - axis] == "repeat" else "clip"
+        repeats = maps.wrap[1 - axis] == "repeat"
         low = np.floor(at).astype(int)
         part = (at - low).reshape(-1, *[1] * (image.ndim - 1 - axis))
-        first, second = (np.take(image, low + i, axis=axis, mode=mode) for i in (0, 1))
+        ends = [(low + i) % old if repeats else np.clip(low + i, 0, old - 1) for i in (0, 1)]
+        first, second = (np.take(image, end, axis=axis) for end in ends)
         image = (1.0 - part) * first + part * second
     return image

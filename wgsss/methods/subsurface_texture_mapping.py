@@ -1,17 +1,14 @@
 """francois06: subsurface texture mapping (Norberg 2010, 2.1 and 3.1; Francois et al. 2006).
 
 Light that is scattered exactly once, summed along the viewing ray through the layers of a material. The result depends
-on the viewer, so it is no integral of a diffusion profile. M is pi L_inside / eta^2, where L_inside is the radiance that
-arrives at the surface from below: the composite then shows rho_dt L_inside / eta^2.
+on the viewer, so it is no integral of a diffusion profile. M is pi L_inside / eta^2, where L_inside is the radiance
+that arrives at the surface from below: the composite then shows rho_dt L_inside / eta^2.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
-
-import numpy as np
 
 from wgsss.errors import InputError
 from wgsss.frame import Frame
@@ -44,7 +41,11 @@ class SubsurfaceTextureMapping:
     steps: int = field(default=10, metadata={"unit": "", "range": (1, 1000), "help": "steps along the viewing ray"})
     rule: str = field(
         default="segments",
-        metadata={"unit": "", "choices": RULES, "help": "how the sum over the steps is formed; printed is the thesis's"},
+        metadata={
+            "unit": "",
+            "choices": RULES,
+            "help": "how the sum over the steps is formed; printed is the thesis's",
+        },
     )
     light: str = field(
         default="march",
