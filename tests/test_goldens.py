@@ -24,7 +24,7 @@ from wgsss.bake.atlas import library
 from wgsss.bake.sam import SELECTIONS
 from wgsss.gpu import Gpu
 from wgsss.output import save
-from wgsss.registry import METHODS, make_method
+from wgsss.registry import METHODS, make_method, methods_for
 from wgsss.rendering import Image, Renderer
 from wgsss.scene import Scene, load_scene
 from wgsss.scene.builtin import SCENES
@@ -45,7 +45,15 @@ KNOBS: dict[str, dict[str, Any]] = {
 # Other ways of a method, by name and in some scenes: thin and moving.
 VARIANTS = {f"sam-{select}": ("sam", {"select": select, "surface": "screen"}) for select in SELECTIONS}
 UNWRAPPED = {"deon07", "jimenez08"}  # methods whose pictures depend on the atlas, which xatlas made
-DRAWN = [*product(SCENES, METHODS), *product(("ear", "wave"), VARIANTS)]
+# Skin is known by its profile only, which methods of layers refuse.
+DRAWN = [
+    *(
+        (scene, method)
+        for scene in SCENES
+        for method in methods_for(load_scene(scene, vertices=VERTICES.get(scene, 2000)))
+    ),
+    *product(("ear", "wave"), VARIANTS),
+]
 # On the screen, light spreads over less than a pixel, or nothing shines through what is thick.
 BELOW_PIXELS = {*(("crowd", method) for method in ("barre11", "jensen02", "jimenez15", "sam")), ("sphere", "barre11")}
 TIME_S = 0.7  # what moves is not at rest
@@ -153,7 +161,9 @@ def test_there_is_no_golden_that_nothing_draws() -> None:
 
 @needs_flip
 def test_the_tolerance_for_other_drivers_is_smaller_than_the_effect_of_any_method() -> None:
-    for scene, method in product(SCENES, METHODS.keys() - {"lambert"}):
+    for scene, method in DRAWN:
+        if method not in METHODS or method == "lambert":
+            continue
         plain, other = (read(golden_path(scene, name)).pixels for name in ("lambert", method))
         assert flip(other, plain) > MOST_FLIP or (scene, method) in BELOW_PIXELS, f"{scene} {method}"
 

@@ -25,6 +25,7 @@ MOST_SILHOUETTE = 12  # pixels that only one driver covers
 MOST_M = 0.03  # relative RMSE of M over pixels that both cover; edges of shadows differ slightly
 MOST_FLIP = 0.02  # rounding by one step of 255 in most pixels gives 0.012; methods differ by 0.1
 
+DRAWN = sorted(METHODS.keys() - {"francois06"})  # which refuses skin, known by its profile only
 DRAW = """
 import sys
 import numpy as np
@@ -43,10 +44,10 @@ np.savez(sys.argv[1], **pictures)
 
 
 def draw(folder: Path, **environment: str) -> Any:
-    """Render the ear by every method in a new process, since the environment of a process chooses its driver."""
+    """Render the ear by the methods in a new process, since the environment of a process chooses its driver."""
     file = folder / "drawn.npz"
     env = {**os.environ, "PYTHONPATH": str(ROOT), "WGSSS_CACHE": str(folder / "cache"), **environment}
-    done = subprocess.run([sys.executable, "-c", DRAW, str(file), *METHODS], env=env, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", DRAW, str(file), *DRAWN], env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     with np.load(file) as pictures:
         return dict(pictures)
@@ -67,7 +68,7 @@ def test_the_second_driver_is_another_driver(gpu: Gpu, drawn: tuple[Any, Any]) -
     assert "SwiftShader" in second and second != first
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", DRAWN)
 def test_both_drivers_give_the_same_M(drawn: tuple[Any, Any], method: str) -> None:
     first, second = (pictures[f"{method} display"] for pictures in drawn)
     covered = [picture[..., 3] > 0 for picture in (first, second)]
@@ -80,7 +81,7 @@ def test_both_drivers_give_the_same_M(drawn: tuple[Any, Any], method: str) -> No
     assert error <= MOST_M
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", DRAWN)
 def test_pictures_of_both_drivers_look_alike(drawn: tuple[Any, Any], method: str) -> None:
     flip = pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
     first, second = (results[f"{method} display"] for results in drawn)

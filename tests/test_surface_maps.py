@@ -132,7 +132,8 @@ def test_light_that_enters_at_samples_has_the_colours_of_the_vertices(gpu: Gpu) 
     assert red == pytest.approx(plain[0] * (0.5 - x / 20), rel=1e-4, abs=1e-4)
 
 
-@pytest.mark.parametrize("name", METHODS)
+# WHITE is known by its profile only, which francois06 refuses.
+@pytest.mark.parametrize("name", sorted(METHODS.keys() - {"francois06"}))
 def test_every_method_draws_colours_of_vertices(gpu: Gpu, name: str) -> None:
     """Where vertices have no red, neither has the image by any method; where they are red, it is that of white."""
     white = plane(side=20.0, cells=4)

@@ -29,6 +29,7 @@ from wgsss.methods.visible_texture_space import VisibleTextureSpace
 from wgsss.reference.estimate import Reference
 from wgsss.reference.integral import Integral
 from wgsss.reference.volume import Volume
+from wgsss.scene import Scene
 
 SURFACES: dict[str, type[Method]] = {"texture": TextureSpace, "screen": ScreenSpace, "none": Lambert}
 """The surface methods, which estimate M_front."""
@@ -104,6 +105,12 @@ def kind_of(name: str) -> type[Method]:
     if surface not in fitting:
         raise InputError(f"translucency {translucency} goes with surface {' or '.join(fitting)}, not with {surface}")
     return pair(SURFACES[surface], TRANSLUCENCIES[translucency])
+
+
+def methods_for(scene: Scene) -> list[str]:
+    """Return the names of the methods that can draw a scene. Some need the layers of all materials to be known."""
+    are_known = all(item.material.stack is not None for item in scene.objects)
+    return [name for name, kind in METHODS.items() if are_known or not getattr(kind, "needs_layers", False)]
 
 
 def surfaces_for(translucency: str) -> list[str]:

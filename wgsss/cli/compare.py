@@ -13,7 +13,7 @@ files in it are kept"""
 
 _LIGHTS = "all: compare also under one light of each type, each with the same mean irradiance"
 
-_METHODS = "methods to compare, with knobs after colons: lambert,sam,sam:select=top:samples=8 (default: all)"
+_METHODS = "methods to compare, with knobs after colons: lambert,sam,sam:select=top:samples=8 (default: all that can)"
 
 
 def declare(commands: Any) -> None:
@@ -30,16 +30,17 @@ def declare(commands: Any) -> None:
 def run(args: Any) -> None:
     from dataclasses import replace
 
-    from wgsss.registry import METHODS, make_method
+    from wgsss.registry import make_method, methods_for
     from wgsss.study import comparison_tables as tables
     from wgsss.study.compare import compare
     from wgsss.study.measurement import make_reference
     from wgsss.study.report import check_folder, write_report
 
     folder = check_folder(args.output or Path(f"{Path(args.scene).stem}-compare"))
-    methods = [make_method(name, knobs) for name, knobs in args.methods or ((name, None) for name in METHODS)]
     reference = make_reference(args.reference)
     scene = arguments.load_scene(args)
+    chosen = args.methods or [(name, None) for name in methods_for(scene)]
+    methods = [make_method(name, knobs) for name, knobs in chosen]
     comparison = compare(scene, methods, reference, args.size)
     if args.lights:
         from wgsss.study.light_types import light_types

@@ -84,6 +84,8 @@ class SubsurfaceTextureMapping:
         {"steps": 100, **THESIS},
     )
 
+    needs_layers: ClassVar[bool] = True
+
     def bake(self, stage: Stage) -> None:
         """Upload the textures of layers.
 

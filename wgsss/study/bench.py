@@ -76,7 +76,7 @@ def bench(
 
 def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[RunSpec]:
     """Return what to measure in a scene, each setting once."""
-    from wgsss.registry import METHODS, REFERENCES, make_method, sweep_of
+    from wgsss.registry import METHODS, REFERENCES, make_method, methods_for, sweep_of
     from wgsss.study.bench_run import RunSpec
     from wgsss.study.measurement import knobs_of
     from wgsss.study.provenance import scene_digest
@@ -89,7 +89,7 @@ def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], r
     digest = scene_digest(scene)
     return [
         RunSpec(scene.name, digest, method, knobs_of(make_method(method, knobs)) | knobs, step, size, reference)
-        for method in dict.fromkeys(methods or METHODS)
+        for method in dict.fromkeys(methods or methods_for(scene))
         for step, knobs in enumerate(sweep_of(method))
     ]
 

@@ -12,7 +12,7 @@ from wgsss.console import progress_bar
 from wgsss.gpu import default_gpu
 from wgsss.methods import Method
 from wgsss.reference import Estimate, Reference
-from wgsss.registry import METHODS, make_method, name_of
+from wgsss.registry import make_method, methods_for, name_of
 from wgsss.rendering import Image
 from wgsss.scene import Scene
 from wgsss.study.measurement import M_of, compute_truth, knobs_of, make_reference, measure
@@ -90,7 +90,7 @@ class Comparison:
 
 def compare(
     scene: Scene,
-    methods: Sequence[str | Method] = tuple(METHODS),
+    methods: Sequence[str | Method] | None = None,
     reference: str | Reference = "integral",
     size: tuple[int, int] = (256, 256),
     time: float = 0.0,
@@ -99,13 +99,15 @@ def compare(
 ) -> Comparison:
     """Render `scene`, `time` seconds into its motion, by each method and by a reference, and measure the errors.
 
-    Methods and the reference are names, or instances with their knobs set. Against "volume" the errors are also split
+    Methods and the reference are names, or instances with their knobs set; by default, all methods that can draw the
+    scene. Against "volume" the errors are also split
     by cause, unless `by_cause` is false. This computes the integral two or three more times.
 
     Raises InputError for unknown names and for scenes that the reference cannot render, and RenderError if a number is
     not finite.
     """
-    chosen = named([make_method(method) if isinstance(method, str) else method for method in methods])
+    listed = methods_for(scene) if methods is None else methods
+    chosen = named([make_method(method) if isinstance(method, str) else method for method in listed])
     reference = make_reference(reference) if isinstance(reference, str) else reference
     truth = compute_truth(reference, scene, size, time)
     runs = []
