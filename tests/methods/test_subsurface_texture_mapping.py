@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -212,3 +212,23 @@ def test_more_than_four_layers_are_refused(gpu):
     layers = tuple(Layer(SIGMA_A, SIGMA_S, thickness=t) for t in (1, 1, 1, 1, np.inf))
     with pytest.raises(InputError, match="'many' has 5 layers, francois06 takes at most 4"):
         Renderer(lit(material=Material("many", layers=layers)), make_method("francois06"), (8, 8), gpu)
+
+
+@dataclass(frozen=True)
+class Growing:
+    """A body that grows by a third in a second."""
+
+    period_s: float = 10.0
+
+    def apply(self, positions: Any, time_s: float) -> Any:
+        return np.asarray(positions, np.float32) * np.float32(1 + time_s / 3)
+
+
+def test_a_deforming_ball_is_as_accurate_as_one_at_rest(gpu):
+    scene, small = ball(8.0, 75), ball(6.0, 75)
+    growing = replace(small.objects[0], motion=Growing())
+    renderer = Renderer(replace(scene, objects=(growing,)), make_method("francois06"), (32, 32), gpu)
+    renderer.frame(timed=False)
+    M = renderer.frame(1.0, aovs=["M_front"], timed=False).aovs["M_front"]
+    exact, inside = by_brute_force(scene, 8.0, 32)
+    assert relative_error(M[inside][None], exact[inside][None]) <= 0.05
