@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from layered_ball import ball, by_brute_force
+from layered_cylinder import on_a_cylinder, rolled
 from layered_patch import KINDS, brute_force, patch, relative_error
 from scenes import lit, plane
 
@@ -140,6 +141,14 @@ def test_layers_that_follow_a_ball_of_8_mm(gpu, light):
         relative_error(drawn(gpu, scene, 32, distance=distance)[inside][None], exact[inside][None])
         for distance in ("shadow", "tangent")
     )
+    assert shadow <= 0.05
+    assert tangent >= 2.0 * shadow
+
+
+@pytest.mark.parametrize("light", [0, 45, 75])
+def test_veins_around_a_cylinder_of_8_mm(gpu, light):
+    scene, exact = rolled("veins", light), on_a_cylinder("veins", light, 24)
+    shadow, tangent = (relative_error(drawn(gpu, scene, 24, distance=kind), exact) for kind in ("shadow", "tangent"))
     assert shadow <= 0.05
     assert tangent >= 2.0 * shadow
 
