@@ -54,7 +54,7 @@ fn layer_at(depth_here: Length, at: vec3f) -> u32 {
     return select(0u, 1u, below.x) + select(0u, 1u, below.y) + select(0u, 1u, below.z);
 }
 
-// The share of a segment that lies below each interface. `above` and `below` are the depths of its ends below the
+// The share of a segment that lies below each interface. `first` and `last` are the depths of its ends below the
 // interfaces, which are linear between.
 fn share_below(first: vec3f, last: vec3f) -> vec3f {
     let positive = max(first, vec3f(0.0)) + max(last, vec3f(0.0));

@@ -200,8 +200,8 @@ fn by_steps(sight: Sight, end: Length, shift: Number) -> Radiance {
     return radiance;
 }
 
-// The surface about a pixel, and the matrix from its coordinates to the world.
-fn shell_at(texel: vec2u, n: Direction) -> Shell {
+// The surface about a pixel.
+fn shell_at(texel: vec2u) -> Shell {
     let first = textureLoad(mesh_uv, texel, 0);
     let second = textureLoad(v_gradient, texel, 0).xy;
     let s = textureLoad(curvatures, texel, 0).xyz * select(0.0, 1.0, SHADOW);
@@ -213,6 +213,7 @@ fn shell_at(texel: vec2u, n: Direction) -> Shell {
     return Shell(vec3f(k, select(k.y, k.x, abs(k.x) >= abs(k.y))), first.xy, rotated * first.zw, rotated * second);
 }
 
+// The axes of its coordinates in the world: the principal directions, and downwards.
 fn axes_at(texel: vec2u, n: Direction) -> mat3x3f {
     let s = textureLoad(curvatures, texel, 0).xyz * select(0.0, 1.0, SHADOW);
     let turn = principal_rotation(s.x, s.y, s.z);
@@ -235,7 +236,7 @@ fn fs(@builtin(position) pixel: vec4f) -> Pixel {
     let axes = axes_at(texel, n);
     let random = random_numbers(random_words(vec4u(texel, 0u, 0u)));
     var sight: Sight;
-    sight.shell = shell_at(texel, n);
+    sight.shell = shell_at(texel);
     sight.inside = -refracted(w_o, n, eta) * axes; // times the transpose
     let shift = select(0.0, random.x - 0.5, NOISE == WHITE);
     if NOISE == UV {
