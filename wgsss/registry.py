@@ -28,6 +28,7 @@ from wgsss.methods.transmittance import Transmittance
 from wgsss.methods.visible_texture_space import VisibleTextureSpace
 from wgsss.reference.estimate import Reference
 from wgsss.reference.integral import Integral
+from wgsss.reference.layered import LayeredSingleScattering
 from wgsss.reference.volume import Volume
 from wgsss.scene import Scene
 
@@ -42,7 +43,7 @@ TRANSLUCENCIES: dict[str, type[Translucency]] = {
 }
 """The translucency methods, which estimate M_back. The name "none" stands for no M_back."""
 
-REFERENCES: dict[str, type[Reference]] = {"volume": Volume, "integral": Integral}
+REFERENCES: dict[str, type[Reference]] = {"volume": Volume, "integral": Integral, "layers": LayeredSingleScattering}
 """The references that are available by name wherever a method is."""
 
 
