@@ -28,6 +28,6 @@ def test_a_moving_scene_is_exported_at_a_time(tmp_path, capsys):
 
 def test_bad_input_is_an_error(tmp_path, capsys):
     assert main(["export", "ear", "--mitsuba", str(tmp_path)]) == 2
-    assert "needs sigma_a and sigma_s_prime, not gaussians" in capsys.readouterr().err
+    assert "needs coefficients or layers, not gaussians" in capsys.readouterr().err
     assert main(["export", "sphere"]) == 2
     assert "--mitsuba" in capsys.readouterr().err

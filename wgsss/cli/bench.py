@@ -28,6 +28,8 @@ _HEAD = [
     "FLIP",
     "bias",
 ]
+_REFERENCE = """reference for the errors (default: integral; in scenes with maps of layers, layers for methods with
+multiple=off, else volume)"""
 _TABLE = """speedup: in place of the chart, measure how much faster jimenez08 is than the same diffusion over the whole
 surface, by the number of heads and their distance; needs the scene crowd and writes speedup.json"""
 _SIZE = "size in pixels (default: 256x256; with --table 480x300)"
@@ -40,7 +42,7 @@ def declare(commands: Any) -> None:
     add("scenes", metavar="SCENE", nargs="*", help=_SCENES)
     arguments.add_scene_choices(parser)
     add("--methods", metavar="NAME,NAME,…", type=arguments.names, help="default: all (see 'wgsss methods')")
-    add("--reference", metavar="NAME", default="integral", help="reference for the errors (default: integral)")
+    add("--reference", metavar="NAME", help=_REFERENCE)
     add("--table", metavar="NAME", choices=TABLES, help=_TABLE)
     add("--size", metavar="WxH", type=arguments.size, help=_SIZE)
     add("--scheduler", metavar="ADDRESS", help=_SCHEDULER)
@@ -106,7 +108,8 @@ def _print_run(run: Run) -> None:
     if not console.is_terminal():
         cells = dict(zip(_HEAD, _row(run), strict=True))
         setting = " ".join(filter(None, (cells["scene"], "by", cells["method"], cells["knobs"])))
-        console.print_message(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %"))
+        against = "" if run["reference"] == "integral" else f" from {run['reference']}"
+        console.print_message(one_line(f"{setting}: {cells['frame, ms']} ms, error {cells['error, %']} %{against}"))
 
 
 def _rows(runs: list[Run]) -> list[list[str]]:

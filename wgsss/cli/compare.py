@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from wgsss import console
 from wgsss.cli import arguments
 from wgsss.text import one_line
 
 _OUTPUT = """folder for report.html, contact_sheet.png, metrics.json and the images (default: SCENE-compare); other
 files in it are kept"""
+
+_REFERENCE = """integral, layers or volume, which needs Mitsuba 3 (default: integral; in scenes with maps of layers,
+layers for methods with multiple=off, else volume)"""
 
 _LIGHTS = "all: compare also under one light of each type, each with the same mean irradiance"
 
@@ -21,7 +25,7 @@ def declare(commands: Any) -> None:
     arguments.add_scene(parser)
     add = parser.add_argument
     add("--methods", metavar="A,B,…", type=arguments.settings, help=_METHODS)
-    add("--reference", metavar="NAME", default="integral", help="integral (default) or volume, which needs Mitsuba 3")
+    add("--reference", metavar="NAME", help=_REFERENCE)
     add("--size", metavar="WxH", type=arguments.size, default=(256, 256), help="size in pixels (default: 256x256)")
     add("--lights", choices=["all"], help=_LIGHTS)
     add("-o", "--output", metavar="DIR", type=arguments.output, help=_OUTPUT)
@@ -33,14 +37,19 @@ def run(args: Any) -> None:
     from wgsss.registry import make_method, methods_for
     from wgsss.study import comparison_tables as tables
     from wgsss.study.compare import compare
-    from wgsss.study.measurement import make_reference
+    from wgsss.study.measurement import default_reference, make_reference
     from wgsss.study.report import check_folder, write_report
 
     folder = check_folder(args.output or Path(f"{Path(args.scene).stem}-compare"))
-    reference = make_reference(args.reference)
+    reference = make_reference(args.reference) if args.reference else None
     scene = arguments.load_scene(args)
     chosen = args.methods or [(name, None) for name in methods_for(scene)]
     methods = [make_method(name, knobs) for name, knobs in chosen]
+    if reference is None:
+        name = default_reference(scene, methods)
+        reference = make_reference(name)
+        if name != "integral":
+            console.print_message(f"{one_line(scene.name)}: the reference is {name}")
     comparison = compare(scene, methods, reference, args.size)
     if args.lights:
         from wgsss.study.light_types import light_types

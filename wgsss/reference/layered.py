@@ -80,7 +80,7 @@ def _estimate(
 ) -> Arrays:
     width, height = size
     M, error = np.zeros((2, height, width, 3), np.float32)
-    surfaces = [WorldSurface(body) for body in stage.bodies]
+    surfaces = [WorldSurface(thing) for thing in stage.scene.objects]
     points = np.concatenate([surface.positions for surface in surfaces])
     lights = [*emitters(stage.lights, points).lights, *_sky_lights(stage, knobs.sky)]
     graph = Graph(stage.gpu)

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from wgsss.cache import cached
 from wgsss.errors import InputError, Note, RenderError
 from wgsss.reference import mitsuba_render, mitsuba_scene
+from wgsss.reference.mitsuba_grids import VOXELS
 from wgsss.reference.mitsuba_xml import scene_xml
 from wgsss.scene import Scene
 
@@ -41,15 +42,20 @@ _LLVM_PATTERNS = (
 class Paths:
     """Paths along `rays` (N, 6), origins in mm and directions, through a scene as posed. A context manager.
 
+    `bounces`: as of `scene_xml`. `voxels`: largest number of voxels of an object with layers.
+
     Raises InputError if Mitsuba is not installed.
     """
 
-    def __init__(self, scene: Scene, size: tuple[int, int], rays: Array) -> None:
+    def __init__(
+        self, scene: Scene, size: tuple[int, int], rays: Array, bounces: int = 0, voxels: int = VOXELS
+    ) -> None:
         if importlib.util.find_spec("mitsuba") is None:
             raise InputError("volume needs Mitsuba 3: pip install mitsuba")
         from importlib.metadata import version
 
         self._scene, self._size, self._rays = scene, size, rays
+        self._bounces, self._voxels = bounces, voxels
         self._folder = Path(tempfile.mkdtemp(prefix="wgsss-"))
         self._process: subprocess.Popen[str] | None = None
         self._llvm = newest_llvm()
@@ -66,10 +72,11 @@ class Paths:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _content_of_files(self) -> str:
-        """Write the meshes and the environments, and return a digest of the files."""
+        """Write the meshes, the media and the environments, and return a digest of the files."""
         files = mitsuba_scene.write_meshes(self._scene, self._folder)
         for channel in range(3):
             files += mitsuba_scene.write_environment(self._scene, self._folder, channel)
+            files += mitsuba_scene.write_media(self._scene, self._folder, channel, self._voxels)
         digest = hashlib.sha256()
         for file in files:
             digest.update(file.read_bytes())
@@ -84,7 +91,7 @@ class Paths:
     def trace(self, channel: int, scatters: bool, samples: int, bar: Any) -> tuple[Array, Array]:
         """Return the mean radiance (N,) of `samples` paths per ray, W/(m^2 sr), and its standard error squared."""
         first, second = np.zeros(len(self._rays)), np.zeros(len(self._rays))
-        xml = scene_xml(self._scene, self._size, channel, scatters)
+        xml = scene_xml(self._scene, self._size, channel, scatters, self._bounces)
         for number, paths in enumerate(self.batches(samples)):
             # Each batch has its own seed, from which every ray of the batch derives its random numbers.
             seed = ((2 * channel + scatters) << 24) + (number << 6)

@@ -11,10 +11,23 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError, Note
 from wgsss.folders import atomic_folder, created_folder
+from wgsss.reference.mitsuba_grids import VOXELS, box, has_grids, write_grids
 from wgsss.reference.mitsuba_xml import SMOOTH, environment_file, environments, scene_xml
-from wgsss.scene import DirectionalLight, EnvironmentLight, Mesh, PointLight, RectLight, Scene, SphereLight, checks
+from wgsss.scene import (
+    DirectionalLight,
+    EnvironmentLight,
+    Mesh,
+    Object,
+    PointLight,
+    RectLight,
+    Scene,
+    SphereLight,
+    checks,
+)
 
 Array = npt.NDArray[Any]
+
+_THICKEST = 80.0  # largest sigma_t times size of a grid of which Mitsuba traces paths quickly
 
 
 def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path]:
@@ -37,7 +50,8 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
     checks.image_size(size)
     folder = Path(folder)
     with created_folder(folder.parent), atomic_folder(folder) as place:
-        files = [place / "scene.xml", *write_meshes(scene, place), *write_environment(scene, place)]
+        files = [place / "scene.xml", *write_meshes(scene, place), *write_media(scene, place)]
+        files += write_environment(scene, place)
         files[0].write_text(scene_xml(scene, size), encoding="utf-8")
     written = [folder / file.name for file in files]
     if notes:
@@ -48,16 +62,16 @@ def export(scene: Scene, folder: str | Path, size: tuple[int, int]) -> list[Path
 def check(scene: Scene) -> list[str]:
     """Return texts that say what Mitsuba renders differently.
 
-    Raises InputError if Mitsuba cannot represent the scene: a material without coefficients, a mesh with holes, a
-    smooth boundary under a directional or point light, two environment images.
+    Raises InputError if Mitsuba cannot represent the scene: a material of which only the profile is known, a mesh with
+    holes, a smooth boundary under a directional or point light, two environment images.
     """
     notes: dict[str, None] = {}
     sizeless = [light for light in scene.lights if isinstance(light, DirectionalLight | PointLight)]
     for number, thing in enumerate(scene.objects, start=1):
         material, where = thing.material, f"{scene.name}: object {number} ({thing.mesh.name})"
-        if material.sigma_a is None:
-            defined_by = next(n for n in ("layers", "gaussians", "table") if getattr(material, n) is not None)
-            raise InputError(f"{where}: a volume needs sigma_a and sigma_s_prime, not {defined_by} ('{material.name}')")
+        if material.stack is None:
+            defined_by = "gaussians" if material.gaussians is not None else "table"
+            raise InputError(f"{where}: a volume needs coefficients or layers, not {defined_by} ('{material.name}')")
         if material.eta > 1 and material.roughness <= SMOOTH and sizeless:
             raise InputError(
                 f"{where}: no path through the smooth boundary of '{material.name}' can hit a directional or"
@@ -65,6 +79,8 @@ def check(scene: Scene) -> list[str]:
             )
         if not _closed(thing.mesh):
             raise InputError(f"{where}: the mesh has holes, so that it encloses no volume for a medium")
+        if has_grids(material) and _thickness(thing) > _THICKEST:
+            notes[f"the optical thickness of a layered medium is above {_THICKEST:g}, which makes paths slow"] = None
         if material.maps.base_color is not None:
             notes["base colour textures are ignored"] = None
         if material.maps.normal is not None:
@@ -100,6 +116,15 @@ def write_environment(scene: Scene, folder: Path, channel: int | None = None) ->
     return [path]
 
 
+def write_media(scene: Scene, folder: Path, channel: int | None = None, voxels: int = VOXELS) -> list[Path]:
+    """Write the grids of the layered media, with all channels or with one. Returns the files."""
+    written = []
+    for number, thing in enumerate(scene.objects, start=1):
+        if has_grids(thing.material):
+            written += write_grids(number, thing, folder, channel, voxels)
+    return written
+
+
 def write_meshes(scene: Scene, folder: Path) -> list[Path]:
     """Write the mesh of each object in world space, with shading normals, as binary `<number>.ply`."""
     written = []
@@ -125,6 +150,12 @@ def _ply(positions: Array, normals: Array, faces: Array) -> bytes:
     corners = np.empty(len(faces), np.dtype([("count", "u1"), ("corners", "<i4", (3,))]))
     corners["count"], corners["corners"] = 3, faces
     return header.encode() + np.hstack([positions, normals]).astype("<f4").tobytes() + corners.tobytes()
+
+
+def _thickness(thing: Object) -> float:
+    """Return the largest sigma_t of the layers of an object times its size."""
+    densest = max(float(np.max(layer.sigma_s + layer.sigma_a)) for layer in thing.material.stack or ())
+    return densest * float(box(thing)[1].max())
 
 
 def _closed(mesh: Mesh) -> bool:

@@ -4,7 +4,8 @@ Lengths stay in millimetres, so that coefficients are in 1/mm. The intensity of 
 because irradiance is in W/m^2 and distances are in mm. The other radiometric quantities do not depend on the unit of
 length.
 
-A medium scatters isotropically with its reduced coefficients. Its boundary is
+A homogeneous medium scatters isotropically with its reduced coefficients. Layers are grids (`mitsuba_grids`). The
+boundary of a medium is
 
 - none if eta is 1: light enters and leaves without reflection;
 - otherwise a GGX dielectric of alpha = roughness^2, the surface that our specular lobe and rho_dt assume;
@@ -23,10 +24,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from wgsss.reference.mitsuba_grids import box, cosines, grid_file, has_grids
 from wgsss.scene import (
     DirectionalLight,
     EnvironmentLight,
     Material,
+    Object,
     OrthographicCamera,
     PointLight,
     RectLight,
@@ -43,21 +46,33 @@ _MM2_PER_M2 = 1e6
 _STEPS = (16, 4096)  # smallest and largest number of scattering events before Russian roulette
 
 
-def scene_xml(scene: Scene, size: tuple[int, int], channel: int | None = None, scatters: bool = True) -> str:
-    """Return the XML of a scene. Its meshes and its environment are files beside it.
+def scene_xml(
+    scene: Scene, size: tuple[int, int], channel: int | None = None, scatters: bool = True, bounces: int = 0
+) -> str:
+    """Return the XML of a scene. Its meshes, its grids and its environment are files beside it.
 
     With a `channel`, all three channels of the rendering are this one. If `scatters` is false, the media absorb all the
-    light that they would scatter.
+    light that they would scatter. `bounces`: largest number of scattering events and refractions of a path, 0 for all.
     """
     root = ElementTree.Element("scene", version="3.0.0")
     several = "volpathmis" if channel is None else "volpath"
-    _plugin(root, "integrator", several, max_depth=-1, rr_depth=_steps(scene), hide_emitters=True)
+    _plugin(
+        root,
+        "integrator",
+        several,
+        max_depth=bounces + 1 if bounces else -1,
+        rr_depth=_steps(scene),
+        hide_emitters=True,
+    )
     ElementTree.SubElement(root, "default", name="spp", value="256")
     root.append(_camera(scene, size))
     for number, thing in enumerate(scene.objects, start=1):
         shape = _plugin(root, "shape", "ply", filename=f"{number}.ply")
         shape.append(_boundary(thing.material))
-        shape.append(_medium(thing.material, channel, scatters))
+        if has_grids(thing.material):
+            shape.append(_grid_medium(number, thing, channel, scatters))
+        else:
+            shape.append(_medium(thing.material, channel, scatters))
     for light in scene.lights:
         if not isinstance(light, EnvironmentLight):
             _add_light(root, light, channel)
@@ -96,7 +111,7 @@ def _steps(scene: Scene) -> int:
 
     Earlier roulette would add noise.
     """
-    albedo = max(float(np.max(thing.material.stack[0].albedo)) for thing in scene.objects if thing.material.stack)
+    albedo = max(float(np.max(layer.albedo)) for thing in scene.objects for layer in thing.material.stack or ())
     fewest, most = _STEPS
     return max(fewest, min(most, math.ceil(math.log(0.01) / math.log(albedo)))) if albedo < 1 else most
 
@@ -149,6 +164,33 @@ def _medium(material: Material, channel: int | None, scatters: bool) -> Element:
     _rgb(element, "sigma_t", sigma_t / scale, None)
     _rgb(element, "albedo", layer.albedo * scatters, channel)
     _plugin(element, "phase", "isotropic")
+    return element
+
+
+def _grid_medium(number: int, thing: Object, channel: int | None, scatters: bool) -> Element:
+    element = _plugin(None, "medium", "heterogeneous", name="interior", scale=1.0)
+    element.append(_grid("sigma_t", grid_file(number, "sigma_t", channel), thing))
+    if scatters:
+        element.append(_grid("albedo", grid_file(number, "albedo", channel), thing))
+    else:
+        _rgb(element, "albedo", (0.0, 0.0, 0.0), None)
+    first, *others = [_plugin(None, "phase", "hg", g=float(g)) for g in cosines(thing.material)]
+    phase = first
+    for n, other in enumerate(others, start=1):
+        blend = ElementTree.Element("phase", type="blendphase")
+        blend.append(_grid("weight", grid_file(number, f"weight.{n}", channel), thing))
+        blend.extend([phase, other])
+        phase = blend
+    element.append(phase)
+    return element
+
+
+def _grid(name: str, file: str, thing: Object) -> Element:
+    element = _plugin(None, "volume", "gridvolume", name, filename=file, raw=True, filter_type="nearest")
+    low, size = box(thing)
+    to_world = ElementTree.SubElement(element, "transform", name="to_world")
+    for kind, values in (("scale", size), ("translate", low)):
+        ElementTree.SubElement(to_world, kind, {axis: _number(v) for axis, v in zip("xyz", values, strict=True)})
     return element
 
 

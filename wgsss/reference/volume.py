@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from wgsss.console import progress_bar
-from wgsss.errors import Note
+from wgsss.errors import InputError, Note
 from wgsss.frame import begin
 from wgsss.graph import Graph
 from wgsss.reference.estimate import Estimate, Reference
+from wgsss.reference.mitsuba_grids import VOXELS
 from wgsss.reference.mitsuba_paths import Paths
 from wgsss.reference.mitsuba_scene import check
 from wgsss.stage import Stage
@@ -37,10 +38,21 @@ class Volume(Reference):
     boundary, small lights need thousands or more. Such a boundary also loses light, because Mitsuba ignores light that
     one facet reflects to another: a white medium of eta 1.5 loses 10 % at a roughness of 0.35, 35 % at 0.6, and nothing
     at 0.02.
+
+    Layers become grids of voxels, with their true sigma_s and g (`mitsuba_grids`). A homogeneous medium scatters
+    isotropically with its reduced coefficients.
     """
 
     samples: int = field(
         default=256, metadata={"unit": "paths", "range": (2, 1 << 20), "help": "number per pixel and channel"}
+    )
+    bounces: int = field(
+        default=0,
+        metadata={"unit": "", "range": (0, 1 << 16), "help": "largest number of scattering events; 0 for all"},
+    )
+    voxels: int = field(
+        default=VOXELS,
+        metadata={"unit": "", "range": (1000, 1 << 27), "help": "largest number of voxels of an object with layers"},
     )
 
     source: ClassVar[str] = "Jakob et al. 2022, Mitsuba 3: volumetric path tracing"
@@ -52,19 +64,21 @@ class Volume(Reference):
         Each batch of paths is cached when it is done, so that an interrupted run continues, and a larger number of
         samples adds to the cached ones.
 
-        Raises InputError without Mitsuba, and for scenes that Mitsuba cannot represent (`mitsuba_scene.check`). Raises
-        RenderError if Mitsuba fails.
+        Raises InputError without Mitsuba, for a limit of bounces with eta above 1, and for scenes that Mitsuba cannot
+        represent (`mitsuba_scene.check`). Raises RenderError if Mitsuba fails.
         """
         scene = stage.scene
         if notes := check(scene):
             note = f"{scene.name}: volume differs from our methods: {'; '.join(notes)}"
             warnings.warn(note, Note, stacklevel=2)
         bounded = any(thing.material.eta > 1 for thing in scene.objects)
+        if bounded and self.bounces:
+            raise InputError(f"{scene.name}: volume counts refractions as scattering: bounces needs materials of eta 1")
         renderings = [(channel, scatters) for channel in range(3) for scatters in ((True, False)[: 1 + bounded])]
         pixels = _Pixels(stage, size)
         scattered, variance = np.zeros((2, len(pixels.rays), 3))
         with (
-            Paths(scene, size, pixels.rays) as paths,
+            Paths(scene, size, pixels.rays, self.bounces, self.voxels) as paths,
             progress_bar(total=len(renderings) * self.samples, desc="volume", unit=" paths/pixel") as bar,
         ):
             for channel, scatters in renderings:

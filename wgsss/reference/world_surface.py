@@ -1,4 +1,4 @@
-"""The surface of a body in world space: rays that meet it, and its points closest to others."""
+"""The surface of an object in world space: rays that meet it, and its points closest to others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from wgsss.bake.rays import Caster
 from wgsss.bake.samples import Samples, subdivided
-from wgsss.stage import Body
+from wgsss.bake.unwrap import split
+from wgsss.scene import Object
 
 Array = npt.NDArray[Any]
 
@@ -37,15 +38,14 @@ class Hits:
 
 
 class WorldSurface:
-    """The surface of a body as posed, in world space, mm."""
+    """The surface of an object as posed, in world space, mm."""
 
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        render_mesh, mesh, matrix = body.render_mesh, body.mesh, body.rest.matrix
+    def __init__(self, thing: Object) -> None:
+        self._mesh, matrix = thing.mesh, thing.matrix
+        render_mesh = split(self._mesh)
         self.faces = render_mesh.faces
-        self.positions = mesh.positions[render_mesh.vertex].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-        own = render_mesh.normals if mesh is body.rest.mesh else mesh.normals[render_mesh.vertex]
-        self._normals = own @ matrix[:3, :3].T
+        self.positions = self._mesh.positions[render_mesh.vertex].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        self._normals = render_mesh.normals @ matrix[:3, :3].T
         self._corners = self.positions[self.faces]
         self._uvs = render_mesh.uvs.astype(np.float64)
         across = np.cross(self._corners[:, 1] - self._corners[:, 0], self._corners[:, 2] - self._corners[:, 0])
@@ -98,7 +98,7 @@ class WorldSurface:
         """A KD-tree over samples of the surface, and the face of each sample."""
         from scipy.spatial import KDTree
 
-        samples = subdivided(self._body.mesh, float(np.sqrt(self.area / _SAMPLES * 2)))
+        samples = subdivided(self._mesh, float(np.sqrt(self.area / _SAMPLES * 2)))
         return KDTree(self.at(samples)[0]), samples.face
 
     def _interpolated_normals(self, face: Array, barycentric: Array) -> Array:

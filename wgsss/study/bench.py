@@ -21,7 +21,6 @@ Task = tuple["Scene", "RunSpec"]
 Executor = tuple[set[str], Callable[[Sequence[Task]], Iterator[Run]]]
 """The adapters that tasks run on, and a function that does tasks and yields their runs as they end."""
 
-DEFAULT_REFERENCE = "integral"
 _IDENTITY = ("scene", "digest", "method", "knobs", "size", "reference", "version")
 """Keys that two runs on one adapter share if they measure the same thing."""
 
@@ -32,7 +31,7 @@ def bench(
     folder: str | Path = "bench",
     size: tuple[int, int] = (256, 256),
     *,
-    reference: str = DEFAULT_REFERENCE,
+    reference: str | None = None,
     scheduler: str | None = None,
     on_run: Callable[[Run], None] = lambda run: None,
 ) -> list[Run]:
@@ -44,7 +43,7 @@ def bench(
 
     Args:
         size: width and height, pixels.
-        reference: a name in `REFERENCES`.
+        reference: a name in `REFERENCES`. By default, `measurement.default_reference` chooses it for each setting.
         scheduler: address of a Dask cluster to run on. By default, runs are done here one after another. Each worker
             should have a machine to itself, because other work on it slows the frames that are timed.
         on_run: called with each run when it ends.
@@ -74,24 +73,26 @@ def bench(
     return [done[_key(spec.json())] for _, spec in specs]
 
 
-def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str) -> list[RunSpec]:
+def _specs(scene: Scene, methods: Sequence[str] | None, size: tuple[int, int], reference: str | None) -> list[RunSpec]:
     """Return what to measure in a scene, each setting once."""
     from wgsss.registry import METHODS, REFERENCES, make_method, methods_for, sweep_of
     from wgsss.study.bench_run import RunSpec
-    from wgsss.study.measurement import knobs_of
+    from wgsss.study.measurement import default_reference, knobs_of
     from wgsss.study.provenance import scene_digest
 
     for method in methods or ():
         if method in REFERENCES:
             raise unknown("method", method, METHODS)
-    if reference not in REFERENCES:
+    if reference is not None and reference not in REFERENCES:
         raise unknown("reference", reference, REFERENCES)
     digest = scene_digest(scene)
-    return [
-        RunSpec(scene.name, digest, method, knobs_of(make_method(method, knobs)) | knobs, step, size, reference)
-        for method in dict.fromkeys(methods or methods_for(scene))
-        for step, knobs in enumerate(sweep_of(method))
-    ]
+    specs = []
+    for name in dict.fromkeys(methods or methods_for(scene)):
+        for step, knobs in enumerate(sweep_of(name)):
+            made = make_method(name, knobs)
+            against = reference or default_reference(scene, [made])
+            specs.append(RunSpec(scene.name, digest, name, knobs_of(made) | knobs, step, size, against))
+    return specs
 
 
 def _key(run: Mapping[str, object]) -> str:

@@ -15,7 +15,7 @@ from wgsss.reference import Estimate, Reference
 from wgsss.registry import make_method, methods_for, name_of
 from wgsss.rendering import Image
 from wgsss.scene import Scene
-from wgsss.study.measurement import M_of, compute_truth, knobs_of, make_reference, measure
+from wgsss.study.measurement import M_of, compute_truth, default_reference, knobs_of, make_reference, measure
 from wgsss.study.metrics import Errors
 from wgsss.study.run_record import Knob
 from wgsss.text import one_line
@@ -91,7 +91,7 @@ class Comparison:
 def compare(
     scene: Scene,
     methods: Sequence[str | Method] | None = None,
-    reference: str | Reference = "integral",
+    reference: str | Reference | None = None,
     size: tuple[int, int] = (256, 256),
     time: float = 0.0,
     *,
@@ -99,8 +99,8 @@ def compare(
 ) -> Comparison:
     """Render `scene`, `time` seconds into its motion, by each method and by a reference, and measure the errors.
 
-    Methods and the reference are names, or instances with their knobs set; by default, all methods that can draw the
-    scene. Against "volume" the errors are also split
+    Methods and the reference are names, or instances with their knobs set. By default the methods are all that can draw
+    the scene, and the reference is that of `default_reference`. Against "volume" the errors are also split
     by cause, unless `by_cause` is false. This computes the integral two or three more times.
 
     Raises InputError for unknown names and for scenes that the reference cannot render, and RenderError if a number is
@@ -108,6 +108,7 @@ def compare(
     """
     listed = methods_for(scene) if methods is None else methods
     chosen = named([make_method(method) if isinstance(method, str) else method for method in listed])
+    reference = reference or default_reference(scene, list(chosen.values()))
     reference = make_reference(reference) if isinstance(reference, str) else reference
     truth = compute_truth(reference, scene, size, time)
     runs = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -107,6 +108,18 @@ def M_of(image: Image) -> Array:
 def knobs_of(method: Method) -> dict[str, Knob]:
     """Return the knobs of a method with their values."""
     return {f.name: getattr(method, f.name) for f in fields(method)}  # type: ignore[arg-type]
+
+
+def default_reference(scene: Scene, methods: Sequence[Method]) -> str:
+    """Return the name of the reference for methods in a scene, if the user names none.
+
+    It is the integral unless a material has maps of layers. There, methods that scatter light once, those with a knob
+    `multiple` that is off, are compared with `layers`, and others with `volume`.
+    """
+    if not any(thing.material.maps.layers for thing in scene.objects):
+        return "integral"
+    once = all(getattr(method, "multiple", True) in (False, "off") for method in methods)
+    return "layers" if once else "volume"
 
 
 def make_reference(name: str) -> Reference:
