@@ -16,7 +16,8 @@ from wgsss.errors import InputError, Note
 from wgsss.optics import Layer
 from wgsss.reference.layered import LayeredSingleScattering
 from wgsss.reference.layered_medium import LayeredMedium, sample_image
-from wgsss.reference.mitsuba_scene import export
+from wgsss.reference.mitsuba_scene import write_media
+from wgsss.reference.mitsuba_xml import scene_xml
 from wgsss.reference.single_scattering import henyey_greenstein, logarithmic_mean, shares_of_layers
 from wgsss.reference.volume import Volume
 from wgsss.reference.world_surface import WorldSurface
@@ -266,8 +267,8 @@ def tile(medium: Material, light, view: float) -> Scene:
 def test_the_export_of_layers(tmp_path):
     """There is one phase function for each g, nested, and the grids have the coefficients of the layers."""
     scene = tile(height_map("flat"), sun(45), 30)
-    export(scene, tmp_path, (8, 8))
-    medium = ElementTree.parse(tmp_path / "scene.xml").find("shape/medium")
+    write_media(scene, tmp_path, None, 8000)
+    medium = ElementTree.fromstring(scene_xml(scene, (8, 8))).find("shape/medium")
     blends = medium.findall(".//phase[@type='blendphase']")
     assert medium.attrib["type"] == "heterogeneous"
     assert [phase.find("float").attrib["value"] for phase in medium.iter("phase") if phase.attrib["type"] == "hg"] == [

@@ -16,7 +16,7 @@ from wgsss.scene import Object
 
 Array = npt.NDArray[Any]
 
-_SAMPLES = 100_000  # number of samples of the surface among which the closest are searched, about
+_SAMPLES = 10_000  # number of samples of the surface among which the closest are searched, about
 _CANDIDATES = 4  # faces per query: those of the closest samples
 _LIFT = 1e-5  # size of the mesh: distance by which rays start off the surface
 
