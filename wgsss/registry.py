@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any
 
 from wgsss.errors import InputError, unknown
+from wgsss.methods.depth_parallax import DepthParallax
 from wgsss.methods.knobs import check_declaration, parsed
 from wgsss.methods.lambert import Lambert
 from wgsss.methods.local_thickness import LocalThickness
@@ -74,6 +75,7 @@ ROWS = (
     Row("jensen02", PointCloud, place=3),
     Row("sam", pair(TextureSpace, SamTranslucency), place=2, sweep=_SAM_SWEEP),
     Row("francois06", SubsurfaceTextureMapping, place=7),
+    Row("oat06", DepthParallax, place=8),
 )
 
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")

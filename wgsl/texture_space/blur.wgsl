@@ -6,9 +6,10 @@
 // continues in the neighbouring chart, as the seams unfold it.
 
 import package::units::{Area};
-import package::charts::{INSIDE, Seam, across, id_at, settled};
+import package::charts::{INSIDE, across, settled};
 import package::screen::{screen_corner};
 import package::targets::{RGBA16Float};
+import package::walk::{ids, seams, walk};
 
 struct Params {
     axis: vec3f,      // object space; direction 0 is perpendicular to it and to the normal
@@ -24,8 +25,6 @@ struct Params {
 @group(0) @binding(2) var linear_clamp: sampler;
 @group(0) @binding(3) var gradient_u: texture_2d<f32>; // texels per mm; in w the distance to the chart's border in texels
 @group(0) @binding(4) var gradient_v: texture_2d<f32>;
-@group(0) @binding(5) var ids: texture_2d<u32>;
-@group(0) @binding(6) var<storage, read> seams: array<Seam>;
 
 struct Texel {
     @location(0) blurred: RGBA16Float,
@@ -34,8 +33,6 @@ struct Texel {
 const REACH: f32 = 3.0;   // sigmas to each side, 99.7 % of the Gaussian; the weights are normalised
 const SPACING: f32 = 1.5; // between taps, in sigmas of the source's own blur: the error stays below 1e-3
 const MAX_TAPS: f32 = 64.0; // to each side
-const MAX_CROSSINGS: u32 = 6u;
-const BISECTIONS: u32 = 8u; // finds the crossing to a texel in steps of up to 256
 
 // Variances, in texels^2, of blurs that sampling adds.
 const SPLINE: f32 = 1.0 / 3.0; // of the B-spline with which gather.wgsl reads the result
@@ -45,52 +42,6 @@ const HALVING: f32 = 0.25;     // of bilinear reads of a larger map
 @vertex
 fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return vec4f(screen_corner(i).xy, params.depth, 1.0);
-}
-
-// Whether uv is in the gutter of a chart, given by its id. Between two charts that are close, a texel belongs to the
-// gutter of the nearer one.
-fn leads_out_of(chart: u32, uv: vec2f) -> bool {
-    let id = id_at(ids, uv);
-    return id != 0u && (id & INSIDE) == 0u && (INSIDE | seams[max(id, 1u) - 1u].chart) == chart;
-}
-
-// The point that is reached from `start`, inside a chart, by going `step` along the surface.
-fn walk(start: vec2f, step: vec2f) -> vec2f {
-    let size = vec2f(textureDimensions(ids));
-    var a = start;
-    var b = start + step;
-    for (var i = 0u; i < MAX_CROSSINGS; i++) {
-        let chart = id_at(ids, a);
-        let end = id_at(ids, b);
-        if end == chart || chart == 0u {
-            break;
-        }
-        var seam_id = chart;
-        if (chart & INSIDE) != 0u { // otherwise `a` is at a corner, in the gutter of the chart that it has come to
-            var inside = 0.0; // bisection finds where a to b crosses the border
-            var outside = 1.0;
-            for (var k = 0u; k < BISECTIONS; k++) {
-                let middle = 0.5 * (inside + outside);
-                if id_at(ids, mix(a, b, middle)) == chart {
-                    inside = middle;
-                } else {
-                    outside = middle;
-                }
-            }
-            let at_border = mix(a, b, inside);
-            // One texel farther, to arrive inside the neighbouring chart and not on its border.
-            let beyond = mix(a, b, min(outside + 1.0 / length((b - a) * size), 1.0));
-            a = select(mix(a, b, outside), beyond, leads_out_of(chart, beyond));
-            seam_id = id_at(ids, a);
-            if !leads_out_of(chart, a) { // charts that touch have no gutter: stop at the border
-                return at_border;
-            }
-        }
-        let seam = seams[seam_id - 1u];
-        a = settled(ids, across(seam, a));
-        b = across(seam, b);
-    }
-    return select(a, b, id_at(ids, a) == id_at(ids, b));
 }
 
 @fragment

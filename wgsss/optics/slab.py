@@ -57,27 +57,31 @@ class SpectralProfile(Profile):
         return self.spectra(k).T_down
 
 
-def slab_spectra(medium: Medium, thickness: float, above: float, below: float, k: ArrayLike) -> SlabSpectra:
+def slab_spectra(
+    medium: Medium, thickness: float, above: float, below: float, k: ArrayLike, source: Array | None = None
+) -> SlabSpectra:
     """Return the transforms of a finite slab between media of indices `above` and `below`, at `k` (...) in 1/mm.
+
+    `source` (3,): depth l of the source below the lit face, mm, by default the mean free path.
 
     The geometric series of the images has the sums, for light from above,
 
         R = alpha' cosh(q z0) sinh(q (s + zs - l)) / sinh(q H)        T = alpha' cosh(q zs) sinh(q (l + z0)) / sinh(q H)
 
-    with q^2 = sigma_tr^2 + k^2, the thickness s, the mean free path l, z0 and zs as in `extrapolation`, and
+    with q^2 = sigma_tr^2 + k^2, the thickness s, z0 and zs as in `extrapolation`, and
     H = s + z0 + zs. They are computed from falling exponentials, which cannot overflow.
     """
     q = decay(medium, k)
     z0, zs = extrapolation(medium, above, below)
-    s, mfp = thickness, medium.mean_free_path
+    s, depth = thickness, medium.mean_free_path if source is None else source
     norm = 0.5 * medium.albedo / np.expm1(-2.0 * q * (s + z0 + zs))
-    reflected, passed = norm * np.exp(-q * mfp), norm * np.exp(-q * (s - mfp))
+    reflected, passed = norm * np.exp(-q * depth), norm * np.exp(-q * (s - depth))
     mirrored_above, mirrored_below = 1.0 + np.exp(-2.0 * q * z0), 1.0 + np.exp(-2.0 * q * zs)
     return SlabSpectra(
-        reflected * mirrored_above * np.expm1(-2.0 * q * (s + zs - mfp)),
-        passed * mirrored_below * np.expm1(-2.0 * q * (mfp + z0)),
-        reflected * mirrored_below * np.expm1(-2.0 * q * (s + z0 - mfp)),
-        passed * mirrored_above * np.expm1(-2.0 * q * (mfp + zs)),
+        reflected * mirrored_above * np.expm1(-2.0 * q * (s + zs - depth)),
+        passed * mirrored_below * np.expm1(-2.0 * q * (depth + z0)),
+        reflected * mirrored_below * np.expm1(-2.0 * q * (s + z0 - depth)),
+        passed * mirrored_above * np.expm1(-2.0 * q * (depth + zs)),
     )
 
 
