@@ -104,7 +104,7 @@ def test_two_methods_cannot_have_one_place(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_places_and_colours_of_methods_stay() -> None:
-    order = ["lambert", "deon07", "sam", "jensen02", "jimenez15", "jimenez08", "barre11", "francois06"]
+    order = ["lambert", "deon07", "sam", "jensen02", "jimenez15", "jimenez08", "barre11", "francois06", "oat06"]
     assert sorted(METHODS, key=place_of) == order
     assert [colour_of(name) for name in order] == list(PALETTE[: len(order)])
 

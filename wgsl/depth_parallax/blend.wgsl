@@ -8,8 +8,9 @@ import package::walk::{walk};
 
 struct Params {
     thickness: Length,    // at a share of 1
-    transparency: Number, // alpha at a right angle; 0 below which there is no layer
+    transparency: Number, // alpha at a right angle
     opaque: Number,       // 1 if the layer has an opacity map, else 0
+    last: u32,            // 1 if there is no layer below, else 0
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -34,13 +35,14 @@ fn fs(in: Varying) -> Texel {
     let lit = textureSampleLevel(light, linear_clamp, uv, 0.0);
     let outer = textureLoad(base, texel, 0).rgb * lit.rgb / max(lit.a, 1e-4);
     let facing = saturate(dot(surface.bent, surface.w_o)); // eq. 19
-    let alpha = params.transparency * facing * (1.0 - params.opaque * share.g);
+    // A layer is absent where its thickness map is black.
+    let alpha = 1.0 - share.r * (1.0 - params.transparency * facing * (1.0 - params.opaque * share.g));
     // Eq. 15 and 16 in world space: the view vector reflected at the bent normal, then at the surface.
     let reflected = reflect(-surface.w_o, surface.bent);
     let transmitted = reflected - 2.0 * surface.n * dot(reflected, surface.n);
     let s = params.thickness * share.r / max(abs(dot(transmitted, surface.n)), 1e-3); // eq. 17
     let step = texels_of(surface, transmitted - surface.n * dot(transmitted, surface.n));
-    if alpha <= 0.0 {
+    if alpha <= 0.0 || params.last == 1u {
         return Texel(vec4f(outer, 1.0));
     }
     let shifted = walk(uv, s * step / size); // eq. 18

@@ -76,11 +76,11 @@ class DepthParallax:
     def bake(self, stage: Stage) -> None:
         """Unwrap each mesh, and fit the blurs of each layer. Raises InputError for a material without layers."""
         for body in stage.bodies:
-            layers_of(body.material)
+            layers_of(body)
             if self.model == "optical":
                 for size in self._blurs.sizes(body):
                     atlas(body, size)
-                for j in range(len(layers_of(body.material))):
+                for j in range(len(layers_of(body))):
                     weights_of(body, j)
             else:
                 for size in (self.map_size, self._light_size):
@@ -108,7 +108,7 @@ class DepthParallax:
 
     def _optical(self, frame: Frame, body: Body) -> Handle:
         """Return what leaves a body at its top, in `lighting.unit`, over its atlas, by the optics of its layers."""
-        layers, maps, blurs = layers_of(body.material), draw_maps(frame, body, self.map_size), self._blurs
+        layers, maps, blurs = layers_of(body), draw_maps(frame, body, self.map_size), self._blurs
         entering = irradiance_texels(frame, body, self.map_size)
         depth: Handle | Texture = frame.stage.gpu.black
         depths: list[Handle | Texture] = []
@@ -148,7 +148,7 @@ class DepthParallax:
 
     def _paper(self, frame: Frame, body: Body) -> Handle:
         """Return what leaves a body at its top, in `lighting.unit`, over its atlas, as in the thesis."""
-        layers, maps = layers_of(body.material), draw_maps(frame, body, self.map_size, alone=True)
+        layers, maps = layers_of(body), draw_maps(frame, body, self.map_size, alone=True)
         light = irradiance_texels(frame, body, self.map_size)
         lights = [light]
         if len(layers) > 1:
@@ -166,7 +166,8 @@ class DepthParallax:
                 label=f"layer {j + 1}",
                 params={
                     "thickness": coefficients_of(body, j)["thickness"],
-                    "transparency": 0.0 if last else self.transparency,
+                    "transparency": self.transparency,
+                    "last": int(last),
                     "opaque": float(maps_of(body.material, j).opacity is not None),
                 },
                 disc=_disc_buffer(body.stage),

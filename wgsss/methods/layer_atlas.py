@@ -25,14 +25,17 @@ _FULL = np.full((1, 1), 255, np.uint8)
 _WHITE = np.full((1, 1, 3), 255, np.uint8)
 
 
-def layers_of(material: Material) -> tuple[Layer, ...]:
-    """Return the layers of a material; a homogeneous one has a single layer.
+def layers_of(body: Body) -> tuple[Layer, ...]:
+    """Return the layers of a body's material; a homogeneous one has a single layer.
 
-    Raises InputError for a material of which only the profile is known.
+    Raises InputError where they are not known, or have textures but the mesh no texture coordinates.
     """
+    material, mesh = body.material, body.rest.mesh
     if material.stack is None:
         name = shortened(material.name, 60)
-        raise InputError(f"method oat06 needs a material with layers, and of '{name}' only the profile is known")
+        raise InputError(f"oat06 needs coefficients or layers, but material '{name}' has only a profile")
+    if material.maps.layers and mesh.corner_uvs is None:
+        raise InputError(f"oat06: '{mesh.name}' has no texture coordinates for its layers' textures")
     return material.stack
 
 
@@ -43,7 +46,7 @@ def maps_of(material: Material, j: int) -> LayerMaps:
 
 def variances_of(body: Body) -> Array:
     """Return the variances, mm^2, of the Gaussians of all layers of a body."""
-    return body.stage.shared(("layer variances", id(body.material)), lambda: shared_variances(layers_of(body.material)))
+    return body.stage.shared(("layer variances", id(body.material)), lambda: shared_variances(layers_of(body)))
 
 
 def weights_of(body: Body, j: int, *, infinite: bool = False) -> Bindings:
@@ -53,7 +56,7 @@ def weights_of(body: Body, j: int, *, infinite: bool = False) -> Bindings:
     """
 
     def make() -> Bindings:
-        layers, maps = layers_of(body.material), maps_of(body.material, j)
+        layers, maps = layers_of(body), maps_of(body.material, j)
         above = layers[j - 1].eta if j else 1.0
         below = layers[j + 1].eta if j + 1 < len(layers) else layers[j].eta
         layer = replace(layers[j], thickness=math.inf) if infinite else layers[j]
@@ -73,7 +76,7 @@ def draw_maps(frame: Frame, body: Body, size: int, *, alone: bool = False) -> li
     """
     below: Handle | Texture = frame.stage.gpu.black
     drawn: list[Outputs] = []
-    for j in reversed(range(len(layers_of(body.material)))):
+    for j in reversed(range(len(layers_of(body)))):
         maps = frame.graph.draw_outputs(
             "depth_parallax/maps",
             size=(size, size),
@@ -92,7 +95,7 @@ def draw_maps(frame: Frame, body: Body, size: int, *, alone: bool = False) -> li
 
 def coefficients_of(body: Body, j: int) -> dict[str, Any]:
     """Return absorption, scattering and thickness of layer `j` of a body, for parameters of shaders."""
-    layer = layers_of(body.material)[j]
+    layer = layers_of(body)[j]
     thickness = min(layer.thickness, 1e6)
     return {"absorption": layer.sigma_a, "scattering": layer.sigma_s_prime, "thickness": thickness}
 
