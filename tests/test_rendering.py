@@ -17,6 +17,7 @@ from wgsss.rendering import Renderer
 from wgsss.scene import EnvironmentLight, load_scene
 
 KNOBS: dict[str, dict[str, Any]] = {
+    "oat06": {"map_size": 64},
     "deon07": {"map_size": 64},
     "jimenez08": {"map_size": 64},
     "sam": {"surface": "screen"},

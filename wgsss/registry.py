@@ -82,8 +82,8 @@ PALETTE = (
     *("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442"),
     *("#882255", "#999933"),
 )
-"""The colours of methods in charts. People with any colour vision can distinguish the first eight (Okabe & Ito 2008); the
-rest are of the muted scheme of Tol 2021."""
+"""The colours of methods in charts. People with any colour vision can distinguish the first eight (Okabe & Ito 2008).
+The rest are of the muted scheme of Tol 2021."""
 _SURFACE_ALONE, _UNKNOWN = "#C0C0C0", "#BBBBBB"
 _SHADES = (0.8, 0.6, 0.4)  # of the colour of a pair, by its surface
 

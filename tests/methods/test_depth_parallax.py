@@ -183,7 +183,7 @@ def ghosts(passes: int, radius: float, sigma: float = 2.0) -> float:
 
 @pytest.mark.parametrize("radius", [8.0, 16.0, 32.0, 48.0])
 def test_four_passes_of_the_disc_are_nearly_a_gaussian_and_one_pass_has_ghosts(radius: float) -> None:
-    assert ghosts(4, radius) <= (0.10 if radius < 48.0 else 0.12)
+    assert ghosts(4, radius) <= 0.10
     assert 0.3 <= ghosts(1, radius) <= 9.0
 
 

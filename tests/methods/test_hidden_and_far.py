@@ -30,7 +30,7 @@ from wgsss.stage import Stage
 SIZE = (24, 24)
 BALL = sphere(radius=10.0, vertices=300)
 SUN = DirectionalLight((0.3, -0.4, -1.0), (2.0, 2.0, 2.0))
-KNOBS: dict[str, dict[str, Any]] = {"deon07": {"map_size": 128}, "jimenez08": {"map_size": 128}}
+KNOBS: dict[str, dict[str, Any]] = {name: {"map_size": 128} for name in ("deon07", "jimenez08", "oat06")}
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from wgsss.scene import EnvironmentLight, Scene, SphereLight, load_scene
 from wgsss.study.light_types import light_types
 
 KNOBS: dict[str, dict[str, Any]] = {
+    "oat06": {"map_size": 64},
     "deon07": {"map_size": 64},
     "jimenez08": {"map_size": 64},
     "sam": {"surface": "screen", "select": "top"},

@@ -26,8 +26,8 @@ Array = npt.NDArray[Any]
 
 TAPS = 16
 """of the disc that blurs in the paper's model"""
-TURN = math.pi * (3.0 - math.sqrt(5.0))
-"""angle by which the disc is turned from pass to pass, so that its taps do not line up"""
+TURN = 0.5153
+"""angle by which the disc is turned from pass to pass. Of 240 pairs of a disc and an angle it has the fewest ghosts"""
 
 
 class _Blurs(TextureSpace):
@@ -223,7 +223,7 @@ def disc(n: int) -> Array:
     They are centred and have the variance of the disc, 1/4 along each axis: those of random points would shift the
     picture and stretch the blur.
     """
-    random = np.random.default_rng(1)
+    random = np.random.default_rng(11)
     points = np.zeros((0, 2))
     while len(points) < n:  # the best of many candidates
         candidates = random.uniform(-1.0, 1.0, (64 * (len(points) + 1), 2))
