@@ -14,6 +14,9 @@ WHITE = Material(
     "white", gaussians=SumOfGaussians(np.array([0.01]), np.array([[0.9, 0.5, 0.1]])), eta=1.4, roughness=0.5
 )
 MATTE = replace(WHITE, specular=0.0)
+DENSE = Material("dense", sigma_a=(0.5,) * 3, sigma_s_prime=(50.0,) * 3, eta=1.4, roughness=0.5, specular=0.0)
+NEED_LAYERS = ("francois06", "oat06")
+"""Methods that refuse materials of which only the profile is known."""
 ABOVE = OrthographicCamera((0, 50, 0), (0, 0, 0), up=(0, 0, -1), height=20)
 
 
@@ -33,6 +36,14 @@ def lit(
 ) -> Scene:
     """Make a scene of one object, some lights, and further objects."""
     return Scene("test", (Object(mesh or plane(), material), *extra), lights, camera, tone_map="none")
+
+
+def drawable(scene: Scene, method: str) -> Scene:
+    """Return a scene that a method can draw: one that needs layers gets DENSE in place of materials without them."""
+    if method not in NEED_LAYERS:
+        return scene
+    objects = (replace(o, material=DENSE) if o.material.stack is None else o for o in scene.objects)
+    return replace(scene, objects=tuple(objects))
 
 
 def write_environment(path: Any, pixels: np.ndarray) -> str:

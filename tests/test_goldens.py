@@ -41,10 +41,11 @@ KNOBS: dict[str, dict[str, Any]] = {
     "organ jensen02": {"spacing": 0.5},
     "crowd jensen02": {"spacing": 20.0},  # heads are large beside what skin scatters over
     "sam": {"surface": "screen"},
+    "oat06": {"map_size": 256},
 }
 # Other ways of a method, by name and in some scenes: thin and moving.
 VARIANTS = {f"sam-{select}": ("sam", {"select": select, "surface": "screen"}) for select in SELECTIONS}
-UNWRAPPED = {"deon07", "jimenez08"}  # methods whose pictures depend on the atlas, which xatlas made
+UNWRAPPED = {"deon07", "jimenez08", "oat06"}  # methods whose pictures depend on the atlas, which xatlas made
 # Skin is known by its profile only, which methods of layers refuse.
 DRAWN = [
     *(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT
+from scenes import NEED_LAYERS
 
 from wgsss.gpu import Gpu
 from wgsss.registry import METHODS
@@ -25,7 +26,7 @@ MOST_SILHOUETTE = 12  # pixels that only one driver covers
 MOST_M = 0.03  # relative RMSE of M over pixels that both cover; edges of shadows differ slightly
 MOST_FLIP = 0.02  # rounding by one step of 255 in most pixels gives 0.012; methods differ by 0.1
 
-DRAWN = sorted(METHODS.keys() - {"francois06"})  # which refuses skin, known by its profile only
+DRAWN = sorted(METHODS.keys() - set(NEED_LAYERS))  # the ear is of a material of which only the profile is known
 DRAW = """
 import sys
 import numpy as np

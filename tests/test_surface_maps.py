@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import ABOVE, MATTE, lit, plane
+from scenes import ABOVE, MATTE, drawable, lit, plane
 
 from wgsss import frame as shared
 from wgsss.bake.samples import Samples
@@ -132,8 +132,7 @@ def test_light_that_enters_at_samples_has_the_colours_of_the_vertices(gpu: Gpu) 
     assert red == pytest.approx(plain[0] * (0.5 - x / 20), rel=1e-4, abs=1e-4)
 
 
-# WHITE is known by its profile only, which francois06 refuses.
-@pytest.mark.parametrize("name", sorted(METHODS.keys() - {"francois06"}))
+@pytest.mark.parametrize("name", METHODS)
 def test_every_method_draws_colours_of_vertices(gpu: Gpu, name: str) -> None:
     """Where vertices have no red, neither has the image by any method; where they are red, it is that of white."""
     white = plane(side=20.0, cells=4)
@@ -141,7 +140,7 @@ def test_every_method_draws_colours_of_vertices(gpu: Gpu, name: str) -> None:
     halves = replace(white, corner_colors=np.concatenate([share, np.ones_like(share), np.ones_like(share)], axis=2))
     knobs = {"map_size": 128} if "map_size" in METHODS[name].__dataclass_fields__ else {}
     got, plain = (
-        Renderer(lit(DOWN, mesh=mesh, material=MATTE), make_method(name, knobs), (16, 16), gpu).frame().pixels
+        Renderer(drawable(lit(DOWN, mesh=mesh), name), make_method(name, knobs), (16, 16), gpu).frame().pixels
         for mesh in (halves, white)
     )
     assert got[8, 1:5, 0].max() <= 0.02 * plain[8, 1:5, 0].max()

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
+from scenes import drawable
 
 from wgsss.gpu import Gpu
 from wgsss.registry import METHODS, make_method, methods_for
@@ -44,7 +45,7 @@ def test_all_types_of_light(gpu: Gpu, method: str, scene: str) -> None:
     if method not in methods_for(load_scene(scene, vertices=1000)):
         pytest.skip("the material of the scene is known by its profile only")
     for name in TYPES:
-        renderer = Renderer(lit(scene)[name], make_method(method, KNOBS.get(method)), (24, 24), gpu)
+        renderer = Renderer(drawable(lit(scene)[name], method), make_method(method, KNOBS.get(method)), (24, 24), gpu)
         image = renderer.frame(aovs=["M_front", "M_back"], timed=False)  # raises where a pixel is not finite
         most = max(float(M.max()) for M in image.aovs.values())
         assert (most > 0.0) == (name != "none"), f"{name}: {most}"

@@ -73,6 +73,8 @@ class DepthParallax:
         *({"map_size": n} for n in (256, 512, 1024)),
     )
 
+    needs_layers: ClassVar[bool] = True
+
     def bake(self, stage: Stage) -> None:
         """Unwrap each mesh, and fit the blurs of each layer. Raises InputError for a material without layers."""
         for body in stage.bodies:

@@ -85,6 +85,8 @@ class SubsurfaceTextureMapping:
     )
 
     needs_layers: ClassVar[bool] = True
+    multiple: ClassVar[bool] = False
+    """whether light that scatters more than once is estimated"""
 
     def bake(self, stage: Stage) -> None:
         """Upload the textures of layers.
