@@ -27,7 +27,7 @@ Array = npt.NDArray[Any]
 TAPS = 16
 """of the disc that blurs in the paper's model"""
 TURN = 0.5153
-"""angle by which the disc is turned from pass to pass. Of 240 pairs of a disc and an angle it has the fewest ghosts"""
+"""angle by which the disc is turned from pass to pass. A search chose it and the seed of the disc for few ghosts"""
 
 
 class _Blurs(TextureSpace):
@@ -40,7 +40,10 @@ class _Blurs(TextureSpace):
 
 @dataclass(frozen=True)
 class DepthParallax:
-    """M_front as the light that the layers of a material return, each seen with parallax; M_back is not estimated."""
+    """M_front as the light that the layers of a material return, each seen with parallax; M_back is not estimated.
+
+    A homogeneous medium is one layer. A material of which only the profile is known is refused.
+    """
 
     model: str = field(
         default="optical",
