@@ -18,7 +18,8 @@ from wgsss.reference.layered import LayeredSingleScattering
 from wgsss.reference.layered_medium import LayeredMedium, sample_image
 from wgsss.reference.mitsuba_scene import write_media
 from wgsss.reference.mitsuba_xml import scene_xml
-from wgsss.reference.single_scattering import henyey_greenstein, logarithmic_mean, shares_of_layers
+from wgsss.reference.refracted_light import henyey_greenstein
+from wgsss.reference.single_scattering import logarithmic_mean, shares_of_layers
 from wgsss.reference.volume import Volume
 from wgsss.reference.world_surface import WorldSurface
 from wgsss.registry import make_method

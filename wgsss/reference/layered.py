@@ -19,7 +19,8 @@ from wgsss.graph import Graph
 from wgsss.reference.estimate import Estimate, Reference
 from wgsss.reference.integral import pixel_receivers
 from wgsss.reference.layered_medium import LayeredMedium
-from wgsss.reference.single_scattering import Boundary, Resolution, SingleScattering
+from wgsss.reference.refracted_light import Boundary
+from wgsss.reference.single_scattering import Resolution, SingleScattering
 from wgsss.reference.world_surface import WorldSurface
 from wgsss.scene.geometry import fibonacci_sphere
 from wgsss.stage import Body, Stage
