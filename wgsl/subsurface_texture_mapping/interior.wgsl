@@ -5,9 +5,6 @@ import package::units::{Number, Direction};
 // The direction inside, away from the surface and towards the light, of light from the direction w (Snell). Where w is
 // below the horizon, the light enters elsewhere, at a point that faces it more: the direction tends to w itself.
 fn refracted(w: Direction, n: Direction, eta: Number) -> Direction {
-    if eta == 1.0 {
-        return w;
-    }
     let cosine = dot(w, n);
     var along = w - n * cosine;
     if cosine <= 0.0 {
@@ -15,7 +12,8 @@ fn refracted(w: Direction, n: Direction, eta: Number) -> Direction {
     }
     along = along / eta;
     let inside = along + n * sqrt(max(1.0 - dot(along, along), 0.0));
-    return normalize(mix(inside, w, smoothstep(0.0, 0.7, -cosine)));
+    // No branch on eta: for branches on uniforms, lavapipe compiles a shader for each draw.
+    return select(normalize(mix(inside, w, smoothstep(0.0, 0.7, -cosine))), w, eta == 1.0);
 }
 
 // The cosine inside of light at a cosine outside.
