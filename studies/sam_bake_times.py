@@ -61,7 +61,7 @@ def main(argv: list[str] | None = None) -> None:
                 print(f"{name}, {select}", file=sys.stderr)
                 wall, cpu, size = bake(scene, args.samples, select)
                 vertices = len(body.mesh.positions)
-                reach = body.profile.range(0.01).max() / np.ptp(body.mesh.bounds, axis=0).max()
+                reach = body.material.profile.range(0.01).max() / np.ptp(body.mesh.bounds, axis=0).max()
                 times.setdefault(select, []).append((vertices, float(reach), cpu))
                 print(f"{name:28}  {vertices:8}  {select:6}  {wall:6.2f}  {cpu:6.2f}  {size:14}", flush=True)
     print("\nthe paper:", ", ".join(f"{name} {took}" for name, took in PAPER.items()))
@@ -99,7 +99,7 @@ def bake(scene: Scene, samples: int, select: str) -> tuple[float, float, int]:
     body = scene.objects[0]
     _ = body.mesh.normals  # computed when first used: counted as loading
     gpu, wall, cpu = default_gpu(), time.perf_counter(), time.process_time()
-    entries = spatial_adjacency_map(gpu, body.mesh, body.profile, samples, select)
+    entries = spatial_adjacency_map(gpu, body.mesh, body.material.profile, samples, select)
     return time.perf_counter() - wall, time.process_time() - cpu, entries.bytes // len(body.mesh.positions)
 
 

@@ -183,7 +183,7 @@ def test_the_command_writes_either_or_both(tmp_path: Path, capsys: pytest.Captur
             ["export", "sphere", "--gltf", "ball.glb", "--size", "0x0"],
             "the image size must be 1 to 8192 pixels a side, not 0x0",
         ),
-        (["export", "ear", "--gltf", "ear.glb", "--mitsuba", "ear"], "needs sigma_a and sigma_s_prime, not gaussians"),
+        (["export", "ear", "--gltf", "ear.glb", "--mitsuba", "ear"], "needs coefficients or layers, not gaussians"),
     ],
 )
 def test_the_command_writes_all_or_nothing(

@@ -13,8 +13,10 @@ import pytest
 from conftest import ROOT
 
 SCRIPT = """
-import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from wgsss.gpu import default_gpu
+from wgsss.reference.mitsuba_grids import write_grids
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer
 from wgsss.scene import load_scene
@@ -26,7 +28,11 @@ methods += [("jensen02", {"spacing": 3.0}), *(("sam", {"select": select}) for se
 for name, knobs in methods:
     Renderer(ear, make_method(name, knobs), (16, 16))
 Renderer(wave, make_method("sam"), (16, 16)).frame(0.5)
-Renderer(load_scene("organ", vertices=300), make_method("lambert"), (16, 16)).frame(0.0)
+organ = load_scene("organ", vertices=300)
+Renderer(organ, make_method("lambert"), (16, 16)).frame(0.0)
+make_method("layers", {"steps": 4, "light_steps": 2, "sky": 1}).estimate(Stage(default_gpu(), organ), (4, 4))
+with TemporaryDirectory() as folder:
+    write_grids(0, organ.objects[0], Path(folder), None, voxels=512)
 make_method("integral", {"samples": 5000}).estimate(Stage(default_gpu(), ear), (8, 8))
 """
 

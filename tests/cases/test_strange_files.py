@@ -112,7 +112,7 @@ def test_the_unmodified_file_is_read(tmp_path: Path) -> None:
     scene, lines = scene_and_notes(whole(), tmp_path)
     assert len(scene.objects) == 2
     assert len(lines) == 4
-    for words in ("boundary edge", "interpolated", "1 light", "1 camera"):
+    for words in ("boundary edge", "interpolation", "1 light", "1 camera"):
         assert [line for line in lines if words in line]
 
 
@@ -141,5 +141,5 @@ def test_an_extreme_normal_scale_is_noted(tmp_path: Path) -> None:
     file = checkered()
     file.tree["materials"][0]["normalTexture"] = {"index": 0, "scale": -5000}
     scene, lines = scene_and_notes(file, tmp_path)
-    assert lines == ["a normal scale of -5000 taken as -100"]
+    assert lines == ["a normal scale of -5000 is replaced by -100"]
     assert scene.objects[0].material.maps.normal_scale == -100

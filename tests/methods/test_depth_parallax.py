@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import ABOVE, lit, plane
+from scenes import ABOVE, lit
 
 from wgsss.errors import InputError
 from wgsss.methods.depth_parallax import TAPS, TURN, DepthParallax, disc
@@ -197,9 +197,3 @@ def test_a_material_of_which_only_the_profile_is_known_is_refused(gpu) -> None:
     skin = replace(MATERIALS["skin"], specular=0.0)
     with pytest.raises(InputError, match="oat06 needs coefficients or layers, but material 'skin' has only a profile"):
         Renderer(lit(DOWN, material=skin, camera=ABOVE), DepthParallax(), (8, 8), gpu)
-
-
-def test_textures_of_layers_need_texture_coordinates(gpu) -> None:
-    bare = replace(plane(), corner_uvs=None)
-    with pytest.raises(InputError, match="oat06: 'plane' has no texture coordinates for its layers' textures"):
-        Renderer(lit(DOWN, mesh=bare, material=striped(medium(1.0))), DepthParallax(), (8, 8), gpu)

@@ -19,7 +19,7 @@ from wgsss.methods.subsurface_texture_mapping import THESIS
 from wgsss.optics import SKIN_GAUSSIANS, Layer
 from wgsss.registry import make_method
 from wgsss.rendering import Renderer
-from wgsss.scene import DirectionalLight, EnvironmentLight, Material, Object, OrthographicCamera, Scene
+from wgsss.scene import DirectionalLight, EnvironmentLight, Material, OrthographicCamera, Scene
 from wgsss.scene.material import LayerMaps, Maps
 
 Array = npt.NDArray[Any]
@@ -207,13 +207,6 @@ def test_interfaces_are_sums_of_thicknesses_and_maps_of_two_sizes_are_joined():
 def test_a_material_known_by_its_profile_is_refused(gpu):
     scene = lit(material=Material("skin", gaussians=SKIN_GAUSSIANS))
     with pytest.raises(InputError, match="francois06 needs coefficients or layers, but material 'skin' has only a pro"):
-        Renderer(scene, make_method("francois06"), (8, 8), gpu)
-
-
-def test_textures_of_layers_need_texture_coordinates(gpu):
-    bare = replace(plane(), corner_uvs=None)
-    scene = replace(patch("flat", 0), objects=(Object(bare, patch("flat", 0).objects[0].material),))
-    with pytest.raises(InputError, match="francois06: 'plane' has no texture coordinates"):
         Renderer(scene, make_method("francois06"), (8, 8), gpu)
 
 

@@ -40,7 +40,7 @@ def photon_table(gpu: Gpu, layers: tuple[Layer, ...]) -> Tabulated:
         r, R = _rows(trace(layers, PHOTONS, gpu=gpu))
         return {"r": r, "R": R}
 
-    arrays = cached("layers", [layers, PHOTONS], make, label="photons through the layers")
+    arrays = cached("layer-profile", [layers, PHOTONS], make, label="photons through the layers")
     return Tabulated(arrays["r"], arrays["R"])
 
 

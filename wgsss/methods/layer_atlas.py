@@ -28,14 +28,12 @@ _WHITE = np.full((1, 1, 3), 255, np.uint8)
 def layers_of(body: Body) -> tuple[Layer, ...]:
     """Return the layers of a body's material; a homogeneous one has a single layer.
 
-    Raises InputError where they are not known, or have textures but the mesh no texture coordinates.
+    Raises InputError if they are not known.
     """
-    material, mesh = body.material, body.rest.mesh
+    material = body.material
     if material.stack is None:
         name = shortened(material.name, 60)
         raise InputError(f"oat06 needs coefficients or layers, but material '{name}' has only a profile")
-    if material.maps.layers and mesh.corner_uvs is None:
-        raise InputError(f"oat06: '{mesh.name}' has no texture coordinates for its layers' textures")
     return material.stack
 
 

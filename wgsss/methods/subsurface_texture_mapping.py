@@ -91,7 +91,7 @@ class SubsurfaceTextureMapping:
     def bake(self, stage: Stage) -> None:
         """Upload the textures of layers.
 
-        Raises InputError where a material has no known layers, or textures but its mesh no texture coordinates.
+        Raises InputError if the layers of a material are not known.
         """
         for body in stage.bodies:
             textures_of(body)
@@ -147,12 +147,10 @@ def textures_of(body: Body) -> LayerTextures:
 
 
 def _stack(body: Body) -> tuple[Layer, ...]:
-    """Return the layers of a body. Raises InputError where they are not known."""
+    """Return the layers of a body. Raises InputError if they are not known."""
     material = body.material
     if material.stack is None:
         raise InputError(f"francois06 needs coefficients or layers, but material '{material.name}' has only a profile")
-    if material.maps.layers and body.rest.mesh.corner_uvs is None:
-        raise InputError(f"francois06: '{body.rest.mesh.name}' has no texture coordinates for its layers' textures")
     return material.stack
 
 
