@@ -58,14 +58,14 @@ class DepthParallax:
     )
     transparency: float = field(
         default=0.5,
-        metadata={"unit": "", "range": (0, 1), "help": "of layers seen at a right angle (model=paper)"},
+        metadata={"unit": "", "range": (0, 1), "help": "share of the inside that shows at a right angle (model=paper)"},
     )
     blur_passes: int = field(
-        default=4, metadata={"unit": "", "range": (1, 8), "help": "of the blur of the light map (model=paper)"}
+        default=4, metadata={"unit": "", "range": (1, 8), "help": "passes of the blur of the light map (model=paper)"}
     )
     map_scale: float = field(
         default=0.5,
-        metadata={"unit": "", "range": (0.125, 1), "help": "size of the light map, in map_size (model=paper)"},
+        metadata={"unit": "", "range": (0.125, 1), "help": "size of the light map over map_size (model=paper)"},
     )
 
     source: ClassVar[str] = (
