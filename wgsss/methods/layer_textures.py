@@ -12,6 +12,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.gpu import Texture
 from wgsss.optics import Layer
+from wgsss.scene.layermaps import levels
 from wgsss.scene.material import MAX_LAYERS, LayerMaps, Maps
 from wgsss.stage import Body, Stage
 
@@ -83,7 +84,7 @@ def interface_depths(layers: tuple[Layer, ...], maps: Maps) -> Array:
     depths = np.zeros((*size, len(own)))
     below = np.zeros(size)
     for j, (layer, one) in enumerate(zip(layers, own, strict=False)):
-        share = np.ones(size) if one.thickness is None else _resized(_share(one.thickness), size, maps)
+        share = np.ones(size) if one.thickness is None else _resized(levels(one.thickness), size, maps)
         below = below + layer.thickness * share
         depths[..., j] = below
     return depths
@@ -99,9 +100,9 @@ def layer_tints(layers: tuple[Layer, ...], maps: Maps) -> Array | None:
     tints = np.ones((MAX_LAYERS, *size, 4))
     for tint, one in zip(tints, own, strict=False):
         if one.color is not None:
-            tint[..., :3] = _resized(_linear(one.color), size, maps)
+            tint[..., :3] = _resized(levels(one.color), size, maps)
         if one.opacity is not None:
-            tint[..., 3] = _resized(_share(one.opacity), size, maps)
+            tint[..., 3] = _resized(levels(one.opacity), size, maps)
     return tints
 
 
@@ -113,16 +114,6 @@ def _size(images: Sequence[Array | None]) -> tuple[int, int]:
     """Return the height and width that hold all of some images; 1 x 1 if there are none."""
     sizes = [image.shape[:2] for image in images if image is not None]
     return max((h for h, _ in sizes), default=1), max((w for _, w in sizes), default=1)
-
-
-def _share(image: Array) -> Array:
-    return image / np.iinfo(image.dtype).max
-
-
-def _linear(image: Array) -> Array:
-    """Convert sRGB in 8 bits to linear values."""
-    v = image / 255.0
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
 
 def _resized(image: Array, size: tuple[int, int], maps: Maps) -> Array:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wgsss.errors import InputError
 from wgsss.scene import Material
+from wgsss.scene.layermaps import levels
 from wgsss.text import shortened
 
 Array = npt.NDArray[Any]
@@ -61,10 +62,7 @@ class LayeredMedium:
         image = getattr(self._maps.layers[layer], name) if self._maps.layers else None
         if image is None:
             return 1.0
-        values = image / float(np.iinfo(image.dtype).max)
-        if name == "color":
-            values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-        return sample_image(values, uv, self._maps.wrap, self._maps.nearest)
+        return sample_image(levels(image), uv, self._maps.wrap, self._maps.nearest)
 
 
 def sample_image(image: Array, uv: Array, wrap: tuple[str, str], nearest: bool) -> Array:

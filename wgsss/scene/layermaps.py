@@ -13,6 +13,7 @@ import numpy.typing as npt
 from wgsss.errors import InputError
 from wgsss.optics import Layer
 from wgsss.optics.medium import THINNEST
+from wgsss.scene.files.colors import linear
 
 MAX_LAYERS = 4
 """Largest number of layers of a material whose layers have maps."""
@@ -71,6 +72,12 @@ def check_layer_maps(layers: Sequence[Layer] | None, maps: Sequence[LayerMaps]) 
                 )
 
 
+def levels(pixels: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Convert a map of a layer to linear values from 0 to 1: colours (H, W, 3) from sRGB, levels (H, W) as they are."""
+    shares = pixels / float(np.iinfo(pixels.dtype).max)
+    return linear(shares) if pixels.ndim == 3 else shares
+
+
 def mean_stack(layers: Sequence[Layer], maps: Sequence[LayerMaps]) -> tuple[Layer, ...]:
     """Return layers of the mean thickness, mean colour and mean opacity of their maps. Absent layers are left out."""
     means = []
@@ -98,8 +105,6 @@ def _mean(pixels: npt.NDArray[Any]) -> float:
 
 def _mean_color(pixels: npt.NDArray[np.uint8]) -> npt.NDArray[np.float64]:
     """Return the mean (3,) of an sRGB map in linear units."""
-    level = np.arange(256) / 255.0
-    linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     counts = np.stack([np.bincount(pixels[..., channel].ravel(), minlength=256) for channel in range(3)])
-    mean: npt.NDArray[np.float64] = counts @ linear / (pixels.size // 3)
+    mean: npt.NDArray[np.float64] = counts @ linear(np.arange(256) / 255.0) / (pixels.size // 3)
     return mean
